@@ -5,22 +5,24 @@ Each record says how its data become the value (`of`), with all names looked up 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
-from typing import Annotated, Any, Literal
+from itertools import accumulate, pairwise
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from firable.analysis.evidence.certificate import Diagram, Markings
 from firable.analysis.evidence.claims import STATE_GOALS, TRUE, Claim, ClaimKind
 from firable.nets.formula import Formula, Holds, format_formula, parse_formula
-from firable.nets.net import Fairness, Net
+from firable.nets.net import Fairness, Marking, Net
 from firable.nets.temporal import Logic, Temporal, format_temporal, logics, parse_temporal
 from firable.nets.temporal_parts import atoms_in
 
 Natural = Annotated[int, Field(ge=0)]
 Hexadecimal = Annotated[str, Field(pattern=r"^(0|[1-9a-f][0-9a-f]*)$")]
+APART_MAX: Final = 100_000
+"""How many markings of a set are written each for itself; of more the steps between them, which are shorter."""
 
 
 class Data(BaseModel):
@@ -93,6 +95,23 @@ class MarkingsRecord(Data):
         return Markings(markings)
 
 
+class AscendingRecord(Data):
+    """Many listed markings: the smallest, and by how much each other one is larger than the one before it."""
+
+    kind: Literal["ascending"]
+    markings: list[Hexadecimal]
+
+    def space(self, net: Net) -> Markings:
+        """The set."""
+        steps = [int(step, 16) for step in self.markings]
+        if not all(steps[1:]):
+            raise ValueError("the markings of a set are not in order, the smallest first")
+        markings = tuple(accumulate(steps))
+        if markings and markings[-1] >> len(net.places):
+            raise ValueError("a marking holds a place that the net does not have")
+        return Markings(markings)
+
+
 class DiagramRecord(Data):
     """A decision diagram."""
 
@@ -123,17 +142,26 @@ class Sets:
 
     def to_json(self) -> list[dict[str, Any]]:
         """The data of all sets."""
-        return [
-            {"kind": "markings", "markings": [f"{marking:x}" for marking in space.markings]}
-            if isinstance(space, Markings)
-            else {
-                "kind": "diagram",
-                "order": list(space.order),
-                "rows": [list(row) for row in space.rows],
-                "roots": list(space.roots),
-            }
-            for space in self.spaces
-        ]
+        return list(map(_set_to_json, self.spaces))
+
+
+def _set_to_json(space: Markings | Diagram) -> dict[str, Any]:
+    match space:
+        case Diagram(order, rows, roots):
+            return {"kind": "diagram", "order": list(order), "rows": list(map(list, rows)), "roots": list(roots)}
+        case Markings(markings) if len(markings) > APART_MAX:
+            return {"kind": "ascending", "markings": [f"{step:x}" for step in steps_of(markings)]}
+        case Markings(markings):
+            return {"kind": "markings", "markings": [f"{marking:x}" for marking in markings]}
+
+
+def steps_of(markings: Sequence[Marking]) -> Iterator[int]:
+    """The first of some markings in order, and by how much each other one is larger than the one before it.
+
+    >>> list(steps_of((2, 3, 9)))
+    [2, 1, 6]
+    """
+    return (after - before for before, after in pairwise((0, *markings)))
 
 
 def known(name: str, names: Mapping[str, int]) -> str:

@@ -12,7 +12,7 @@ the document and seals it anew has either made another proof, or none.
     discipline        interleaving or step
     net               as in bundles (`firable.nets.interchange`)
     sets              the sets of markings, named by their numbers: listed, in hexadecimal, bit i being place i of the
-                      net; or a decision diagram
+                      net, many of them by the steps from each to the next one; or a decision diagram
     verdicts          for each its name (none: bare claims), status, the query that it answers; `shown`: claims, each
                       with its certificate, which is only named (`before`) where an earlier verdict has the claim with
                       the same one; `lacking`: why nothing shows it, where that is so

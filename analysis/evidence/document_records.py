@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from firable.analysis.evidence.certificate_records import CertificateRecord
-from firable.analysis.evidence.claim_records import ClaimRecord, Data, DiagramRecord, MarkingsRecord
+from firable.analysis.evidence.claim_records import AscendingRecord, ClaimRecord, Data, DiagramRecord, MarkingsRecord
 
 
 class BeforeRecord(Data):
@@ -37,5 +37,5 @@ class EvidenceRecord(Data):
     digest: str
     discipline: Literal["interleaving", "step"]
     verdicts: list[_VerdictRecord]
-    sets: list[Annotated[MarkingsRecord | DiagramRecord, Field(discriminator="kind")]]
+    sets: list[Annotated[MarkingsRecord | AscendingRecord | DiagramRecord, Field(discriminator="kind")]]
     net: dict[str, Any]

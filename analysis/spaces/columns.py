@@ -1,6 +1,7 @@
 """Columns: sets of markings of an explored graph, one Boolean for each index, as arrays of numpy.
 
-State formulas become columns, evaluated by the one text of the firing rule in `semantics`. They stand apart from the
+State formulas become columns, evaluated by the one text of the firing rule in `semantics`, on some thousand markings
+at a time, eight of them to the byte, because formulas have thousands of parts. They stand apart from the
 graph (`reachability.py`), because numpy takes longer to load than most nets to explore, and a graph that is only
 counted, or that turns out to be too large, needs none. The rejected alternative, to evaluate formulas in Rust, would be
 a second text of the firing rule to keep equal.
@@ -10,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Final
 
 import numpy as np
@@ -28,12 +30,23 @@ class _Columns(Bitwise[Any]):
         """Where the weights of the terms that are true sum up to at most the bound."""
         total = np.int64(0)
         for term, weight in terms:
-            total = total + np.multiply(term, np.int64(weight))
-        return total <= bound
+            total = total + np.multiply(unpacked(term), np.int64(weight))
+        return packed(total <= bound)
 
 
-COLUMNS: Final[Bitwise[Any]] = _Columns(true=np.True_, false=np.False_)
-"""The algebra of columns: numpy arrays of Booleans, with numpy's own scalars for true and false."""
+COLUMNS: Final[Bitwise[Any]] = _Columns(true=np.uint8(255), false=np.uint8(0))
+"""The algebra of packed columns, eight markings to the byte; the scalars are true and false of any number of them."""
+
+
+def packed(column: Any) -> Any:
+    """A column, or one value for all markings, as `COLUMNS` has it."""
+    return np.packbits(column) if np.ndim(column) else np.uint8(255 if column else 0)
+
+
+def unpacked(column: Any) -> Any:
+    """The Booleans of a packed column, up to seven too many, or the one value of a scalar."""
+    return np.unpackbits(column).astype(np.bool_) if np.ndim(column) else np.bool_(column)
+
 
 NO_COMPONENT: Final = 2**32 - 1
 
@@ -71,12 +84,25 @@ def words_of(markings: bytes, words: int) -> npt.NDArray[np.uint64]:
     return np.frombuffer(markings, "<u8").reshape(-1, words)
 
 
-def reader(rows: npt.NDArray[np.uint64]) -> Callable[[int], Column]:
-    """What reads a place in each of some markings."""
+def order(rows: npt.NDArray[np.uint64]) -> npt.NDArray[np.intp]:
+    """The numbers of rows, that of the smallest marking first."""
+    return np.lexsort(rows.T)  # the last key counts most, as the last word does
 
-    def holds(place: int) -> Column:
-        bit: Column = (rows[:, place // 64] >> np.uint64(place % 64) & np.uint64(1)).astype(np.bool_)
-        return bit
+
+def masks(rows: npt.NDArray[np.uint64]) -> list[int]:
+    """The markings of rows, as bit masks over the places."""
+    if rows.shape[1] == 1:
+        return list[int](rows[:, 0].tolist())
+    data, size = rows.tobytes(), 8 * rows.shape[1]
+    return [int.from_bytes(data[begin : begin + size], "little") for begin in range(0, len(data), size)]
+
+
+def reader(rows: npt.NDArray[np.uint64]) -> Callable[[int], Any]:
+    """What reads a place in each of some markings, packed."""
+
+    @cache
+    def holds(place: int) -> Any:
+        return packed((rows[:, place // 64] & np.uint64(1 << place % 64)) != 0)
 
     return holds
 

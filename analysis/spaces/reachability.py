@@ -129,9 +129,11 @@ class ReachabilityGraph(Derived["Column"]):
         return engine_limits(self.deadline)
 
     @cached_property
-    def ascending(self) -> list[int]:
+    def ascending(self) -> npt.NDArray[np.intp]:
         """The numbers of all markings, smallest marking first: the order in which a list of them is written."""
-        return sorted(range(self.n_markings), key=self.marking)
+        from firable.analysis.spaces.columns import order
+
+        return order(self._words)
 
     @cached_property
     def witnesses(self) -> Witnesses:
@@ -151,6 +153,12 @@ class ReachabilityGraph(Derived["Column"]):
         """The marking of this number, as a bit mask over the places."""
         return self.engine.marking(index)
 
+    def markings(self, numbers: npt.NDArray[np.intp]) -> list[Marking]:
+        """The markings of these numbers, as bit masks over the places."""
+        from firable.analysis.spaces.columns import masks
+
+        return masks(self._words[numbers])
+
     def names(self, index: int) -> tuple[str, ...]:
         """The places that hold a token in the marking of this number."""
         return self.net.names(self.marking(index))
@@ -166,13 +174,19 @@ class ReachabilityGraph(Derived["Column"]):
         return words_of(self.engine.markings_bytes(), self.engine.words)
 
     def where(self, term: Callable[[BooleanAlgebra[Any], Valuation[Any]], Any]) -> Column:
-        """The value of a Boolean term at every marking; `term` gets the algebra and the reader of places."""
-        from firable.analysis.spaces.columns import COLUMNS, reader
+        """The value of a Boolean term at every marking; `term` gets the algebra and the reader of places.
+
+        Raises `BudgetExceeded`.
+        """
+        from firable.analysis.spaces.columns import COLUMNS, reader, unpacked
 
         result = self.none()
         for start in range(0, self.n_markings, _CHUNK):
+            if start and self.deadline.over:
+                raise BudgetExceeded(REASONS["time"])
             rows = self._words[start : start + _CHUNK]
-            result[start : start + _CHUNK] = term(COLUMNS, reader(rows))
+            found = unpacked(term(COLUMNS, reader(rows)))
+            result[start : start + _CHUNK] = found[: len(rows)] if found.ndim else found
         return result
 
     def none(self) -> Column:

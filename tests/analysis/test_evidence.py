@@ -115,10 +115,11 @@ def test_the_markings_of_a_net_show_a_claim_iff_it_is_true(
         assert {by_cvc5(obligation.text(found)) for obligation in obligations(found)} <= {"unsat"}
 
 
+@pytest.mark.parametrize("edges_max", [100_000, 0])
 @given(question=questions(), data=st.data(), discipline=st.sampled_from(DISCIPLINES))
 @examples(40)
 def test_no_certificate_shows_a_claim_that_is_false(
-    question: tuple[Net, Formula], data: st.DataObject, discipline: Discipline
+    edges_max: int, question: tuple[Net, Formula], data: st.DataObject, discipline: Discipline
 ) -> None:
     net, goal = question
     names = st.lists(st.sampled_from(PLACES), max_size=3).map(tuple)
@@ -130,7 +131,7 @@ def test_no_certificate_shows_a_claim_that_is_false(
         st.integers(0, 2),
         st.lists(st.builds(Inequality, weights, st.integers(-3, 2)), max_size=1).map(tuple),
     )
-    markings = st.lists(st.integers(0, 31), unique=True, max_size=32).map(lambda found: Markings(tuple(found)))
+    markings = st.lists(st.integers(0, 31), unique=True, max_size=32).map(lambda found: Markings(tuple(sorted(found))))
     labels = st.one_of(st.lists(st.integers(-1, 3), max_size=32).map(lambda r: Ranks(tuple(r))), st.builds(Whole))
     sets = st.builds(Labelling, markings, st.lists(labels, max_size=2).map(tuple))
     sequences = st.lists(st.sampled_from(["t0", "t1"]).map(lambda t: (t,)), max_size=3).map(
@@ -139,16 +140,26 @@ def test_no_certificate_shows_a_claim_that_is_false(
     certificate = data.draw(st.one_of(invariants, sets, sequences))
     kind = data.draw(st.sampled_from(KINDS))
     evidence = Evidence(net, discipline, Claim(kind, goal), certificate)
-    assert refuses(evidence) or true(evidence)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("firable.analysis.evidence.checking.checker.EDGES_MAX", edges_max)
+        assert refuses(evidence) or true(evidence)
 
 
 def sealed(data: dict[str, Any]) -> str:
     return json.dumps(data | {"seal": seal(data)})
 
 
-@pytest.fixture(params=EXAMPLES)
-def example(request: pytest.FixtureRequest) -> Evidence:
-    found = EXAMPLES[request.param]()
+AT_LARGE = [f"{name}, at large" for name in ("markings", "distances", "labels", "wide", "continuation")]
+"""Examples whose few markings are written, and looked through, as if they were very many."""
+
+
+@pytest.fixture(params=[*EXAMPLES, *AT_LARGE])
+def example(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Evidence:
+    name, _, large = request.param.partition(", ")
+    found = EXAMPLES[name]()
+    if large:
+        monkeypatch.setattr("firable.analysis.evidence.checking.checker.EDGES_MAX", 0)
+        monkeypatch.setattr("firable.analysis.evidence.claim_records.APART_MAX", 0)
     assert found is not None
     assert not refuses(text_of(found))
     return found
@@ -210,7 +221,9 @@ def test_an_edited_certificate_that_is_sealed_anew_is_refused_or_a_proof_all_the
     assert refused
 
 
-@pytest.mark.parametrize("example", ["distances", "labels", "weak", "strong"], indirect=True)
+@pytest.mark.parametrize(
+    "example", ["distances", "labels", "wide", "weak", "strong", "labels, at large", "wide, at large"], indirect=True
+)
 def test_no_edit_of_ranks_shows_the_same(example: Evidence) -> None:
     data = json.loads(text_of(example))
     shown = data["verdicts"][0]["shown"][0]

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from support.evidence import document
 from support.evidence_examples import (
@@ -17,6 +18,7 @@ from support.evidence_examples import (
     fires,
     in_order,
     net,
+    widened,
 )
 from support.true_claims import true
 
@@ -111,11 +113,43 @@ LABELS: dict[str, Callable[[], Evidence]] = {
 }
 
 
-@pytest.mark.parametrize("name", ["M0 is left out", "a firing leads out", "the goal is inside"])
+@pytest.mark.parametrize("name", LABELS)
 def test_a_large_set_is_refused_for_the_same_reasons(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("firable.analysis.evidence.checking.checker.EDGES_MAX", 0)
     with pytest.raises(InputError, match="does not show what it claims"):
         check_evidence(LABELS[name]())
+
+
+@pytest.mark.parametrize("rank", [2, 2**63, 2**64, 10**30])
+def test_a_rank_beyond_the_number_of_markings_is_refused(rank: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("firable.analysis.evidence.checking.checker.EDGES_MAX", 0)
+    with pytest.raises(InputError, match="does not show what it claims"):
+        check_evidence(listed(LOOP, "EF z", ["a", "b"], rank, rank - 1))
+
+
+@pytest.mark.parametrize("markings", [(2, 1), (1, 1, 2)])
+def test_a_large_set_is_in_order_each_marking_once(markings: tuple[int, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("firable.analysis.evidence.checking.checker.EDGES_MAX", 0)
+    with pytest.raises(InputError, match="not in order, each once"):
+        check_evidence(never(LOOP, "a and b", Markings(markings)))
+
+
+def test_a_marking_is_not_taken_for_another_one_with_the_same_hash(monkeypatch: pytest.MonkeyPatch) -> None:
+    of = widened(LOOP)
+    marking, after = of.initial_marking, of.initial_marking ^ of.marking(("a", "b"))
+    evidence = [never(of, "a and b", Markings(markings)) for markings in [(marking, after), (marking,)]]
+    monkeypatch.setattr("firable.analysis.evidence.checking.checker.EDGES_MAX", 0)
+    assert check_evidence(evidence[0]).shown
+
+    class Same:
+        """Keys that are all the same: no firing of the loop changes the hash."""
+
+        def integers(self, *_: object, dtype: type) -> object:
+            return np.ones(len(of.places), dtype=dtype)
+
+    monkeypatch.setattr(np.random, "default_rng", lambda _: Same())
+    with pytest.raises(InputError, match="leads out of the set"):
+        check_evidence(evidence[1])
 
 
 def test_a_large_set_that_is_closed_is_shown_in_columns(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,9 @@ import pytest
 from support.evidence_examples import EXAMPLES, LOOP, RACING
 
 from firable.analysis._engine import BudgetExceeded
+from firable.analysis.check import check
 from firable.analysis.deadline import NEVER, Deadline
+from firable.analysis.evidence import claim_records
 from firable.analysis.evidence.certificate import (
     Certificate,
     Diagram,
@@ -28,12 +30,15 @@ from firable.analysis.evidence.meaning import suffices
 from firable.analysis.evidence.producing import spaces as producing
 from firable.analysis.evidence.producing.claims import Certifier
 from firable.analysis.evidence.producing.lacking import LackingError
+from firable.analysis.evidence.producing.producer import evidence_of_report
+from firable.analysis.evidence.producing.room import Room
 from firable.analysis.evidence.refusal import TimeIsOverError
 from firable.analysis.goal import Limits
 from firable.nets.catalogue.families import family_net
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import And, Holds
-from firable.nets.net import Command, Net, Place
+from firable.nets.net import Command, Net, Place, Transition
+from firable.nets.queries import parse_query
 from firable.nets.temporal import parse_temporal
 from firable.semantics.trace import Discipline
 
@@ -146,5 +151,75 @@ def test_without_a_diagram_in_time_ctl_is_shown_on_more_listed_markings(monkeypa
     assert len(listed.space.markings) == 16
     assert check_evidence(Evidence(net, Discipline.INTERLEAVING, claim, listed)).shown
     monkeypatch.setattr(producing, "WIDE_MAX", 15)
-    with pytest.raises(LackingError, match="markings, and no decision diagram of them at hand"):
+    many = Certifier(net, Discipline.INTERLEAVING, Limits()).certify(claim)
+    assert isinstance(many, Labelling)
+    assert many.space == listed.space
+    monkeypatch.setattr(producing, "MANY_MAX", 15)
+    with pytest.raises(LackingError, match="markings than are listed, and no decision diagram of them at hand"):
         Certifier(net, Discipline.INTERLEAVING, Limits()).certify(claim)
+
+
+@pytest.fixture
+def without_diagrams(monkeypatch: pytest.MonkeyPatch) -> None:
+    def late(*_: object) -> None:
+        raise BudgetExceeded
+
+    monkeypatch.setattr(producing, "explore_symbolically", late)
+
+
+def ending_in(n: int, *ends: str) -> Net:
+    """So many machines that work and rest, and a place that goes to an end, or to one of several, while they do."""
+    machines = family_net(f"machines-{n}")
+    moves = tuple(Transition(f"to_{end}", ("open",), (end,)) for end in ends)
+    turns = tuple(Transition(f"turn_{end}", (end,), (f"{end}2",)) for end in ends)
+    back = tuple(Transition(f"back_{end}", (f"{end}2",), (end,)) for end in ends)
+    places = (Place("open", marked=True), *(Place(f"{end}{k}") for end in ends for k in ("", "2")))
+    transitions = (*machines.transitions, *moves, *turns, *back)
+    return replace(machines, places=(*machines.places, *places), transitions=transitions)
+
+
+@pytest.mark.parametrize("ends", [("left",), ("left", "right")])
+@pytest.mark.usefixtures("without_diagrams")
+def test_more_than_a_hundred_thousand_markings_without_a_diagram_show_every_verdict(ends: tuple[str, ...]) -> None:
+    net = ending_in(15, *ends)
+    texts = ("ctl AG EF AX EX turn", "ctl EF EG open", "ctl AF AG not open", "ctl E[open U AX not open]")
+    queries = [parse_query(text.replace("turn", "firable(turn_left)"), f"q{i}") for i, text in enumerate(texts)]
+    report = check(net, method="explicit", queries=queries)
+    assert report.figures.markings == (1 + 2 * len(ends)) * 2**15
+    found = evidence_of_report(report, queries)
+    text = found.to_text()
+    assert '"kind":"ascending"' in text or len(ends) == 1
+    again = document_from_text(text)
+    assert again.records == found.records
+    checked = {one.record.name: one for one in check_document(again)}
+    assert [name for name, one in checked.items() if not one.shown] == []
+    assert {"home-markings", "starvation", "live", "reversible", "query.q0"} <= set(checked)
+    assert checked["home-markings"].record.proved is (len(ends) == 1)
+
+
+def test_what_finds_no_room_in_a_document_is_only_claimed(monkeypatch: pytest.MonkeyPatch) -> None:
+    report = check(family_net("philosophers-4"), method="explicit")
+    whole = [record.name for record in evidence_of_report(report).records if record.lacking]
+    monkeypatch.setattr("firable.analysis.evidence.producing.producer.Room", lambda: Room(100))
+    found = evidence_of_report(report)
+    lacking = {record.name: record.lacking for record in found.records if record.lacking and record.name not in whole}
+    assert set(lacking.values()) == {"the document would be larger than what is read"}
+    assert 0 < len(lacking) < len(found.records)
+    assert len(found.to_text()) < 20_000
+
+
+@pytest.mark.parametrize(
+    ("steps", "reason"), [(["1", "0"], "not in order"), (["1", "fffff"], "does not have"), (["1", "-1"], "pattern")]
+)
+def test_steps_of_a_large_set_are_refused_where_they_make_none(
+    steps: list[str], reason: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(claim_records, "APART_MAX", 0)
+    claim = Claim(ClaimKind.NEVER, Holds("z"))
+    of = Labelling(Markings((LOOP.initial_marking, 2)))
+    text = Document(LOOP, Discipline.INTERLEAVING, (Record("", True, ((claim, of),)),)).to_text()
+    assert document_from_text(text).records[0].shown[0][1] == of
+    data = json.loads(text)
+    data["sets"][0]["markings"] = steps
+    with pytest.raises(InputError, match=reason):
+        document_from_text(json.dumps({**data, "seal": seal(data)}))

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firable.analysis.spaces.columns import COLUMNS
+from firable.analysis.spaces.columns import COLUMNS, packed, unpacked
 from firable.nets.formula import (
     And,
     Compare,
@@ -127,8 +127,8 @@ def test_a_comparison_has_the_value_of_the_numbers_in_every_algebra(comparison: 
     expected = {"<=": left <= right, "<": left < right, "=": left == right, "!=": left != right, ">=": left >= right}
     value = expected.get(comparison.sign, left > right)
     assert evaluate(BOOL, net, comparison, lambda place: PLACES[place] in marked) is value
-    column = evaluate(COLUMNS, net, comparison, lambda place: np.array([PLACES[place] in marked]))
-    assert bool(np.all(column)) is value
+    column = evaluate(COLUMNS, net, comparison, lambda place: packed(np.array([PLACES[place] in marked])))
+    assert bool(np.atleast_1d(unpacked(column))[0]) is value
 
 
 def test_a_comparison_of_many_places_is_a_term_of_few_parts() -> None:

@@ -88,6 +88,12 @@ RACING = Net(  # each closes the other's gate, and both fire in one step
 ENDING = Net("ending", (Place("a", marked=True), Place("b")), (Transition("end", ("a",), ("b",)),))
 
 
+def widened(net: Net) -> Net:
+    """The same with a word of places before the others, every other one of them marked."""
+    places = tuple(Place(f"beside{i}", marked=i % 2 == 0) for i in range(64))
+    return replace(net, places=(*places, *net.places))
+
+
 def induced(net: Net, goal: Formula, discipline: Discipline = Discipline.INTERLEAVING) -> Evidence | None:
     """What k-induction finds of a goal."""
     found = decide_by_k_induction(net, goal, Limits(Deadline.after(20)), discipline=discipline, depth_max=3)
@@ -157,6 +163,7 @@ EXAMPLES: dict[str, Callable[[], Evidence | None]] = {
     "distances": lambda: certified(catalogue_net(_ROBOT), Claim(ClaimKind.ALWAYS_POSSIBLE, Start())),
     "sequence": lambda: induced(family_net("philosophers-3"), Deadlock()),
     "labels": lambda: certified(family_net("philosophers-2"), _ctl(f"AG EF deadlock and AF ({_END})")),
+    "wide": lambda: certified(widened(family_net("philosophers-2")), _ctl(f"EF EG not deadlock and AF ({_END})")),
     "diagram": lambda: on_diagram(family_net("philosophers-3"), Claim(ClaimKind.NEVER, BOTH_EAT)),
     "back": lambda: on_diagram(family_net("token_ring-3"), Claim(ClaimKind.ALWAYS_POSSIBLE, Start())),
     "rounds": lambda: on_diagram(ENDING, _ctl("AF b")),

@@ -72,7 +72,7 @@ from firable.semantics.trace import Discipline
 
 TIMEOUT_MS: Final = 60_000
 EDGES_MAX: Final = 100_000
-"""Of how many listed markings all firings are kept where nothing but their being closed is asked."""
+"""Of how many listed markings all firings are gone through by the reference player, and kept."""
 
 _SHOWS: Final = {
     FiringSequence: {
@@ -172,9 +172,8 @@ class _Checker:
 
     timeout_ms: int
     _claims: dict[Claim, tuple[Net, Certificate, Checked]] = field(default_factory=dict)
-    _spaces: list[tuple[Net, Markings | Diagram, Listed | Diagrams]] = field(default_factory=list)
+    _spaces: list[tuple[Net, Markings | Diagram, Listed | Closed | Diagrams]] = field(default_factory=list)
     _parts: list[tuple[Net, Markings, Part]] = field(default_factory=list)
-    _sets: list[tuple[Net, Markings, Closed]] = field(default_factory=list)
 
     def check(self, evidence: Evidence) -> Checked:
         """Check one claim."""
@@ -246,28 +245,28 @@ class _Checker:
         """The end of what begins now."""
         return Deadline.after(self.timeout_ms / 1000)
 
-    def _space(self, evidence: Evidence, of: Markings | Diagram) -> Listed | Diagrams:
+    def _space(
+        self, evidence: Evidence, of: Markings | Diagram, *, one_by_one: bool = False
+    ) -> Listed | Closed | Diagrams:
+        single = evidence.discipline is Discipline.INTERLEAVING
+        kind: type[Listed | Closed | Diagrams] = Diagrams if isinstance(of, Diagram) else Listed
+        if isinstance(of, Markings) and single and not one_by_one and len(of.markings) > EDGES_MAX:
+            kind = Closed
         for net, known, space in self._spaces:
             # Of a continuation the net is made anew each time, with the same transitions. What a reduction leaves may
             # have none, as all that is left by others; then the numbers of a marking stand for other places.
             same = net.transitions is evidence.net.transitions and net.place_index == evidence.net.place_index
-            if same and net.initial_marking == evidence.net.initial_marking and known is of:
+            if same and net.initial_marking == evidence.net.initial_marking and known is of and type(space) is kind:
                 return space
         if isinstance(of, Diagram):
-            if evidence.discipline.value != "interleaving":
+            if not single:
                 refuse("a decision diagram is checked under interleaving only")
-            made: Listed | Diagrams = Diagrams(evidence.net, of, self.deadline)
+            made: Listed | Closed | Diagrams = Diagrams(evidence.net, of, self.deadline)
+        elif kind is Closed:
+            made = Closed(evidence.net, of.markings, self.deadline)
         else:
             made = Listed(evidence.net, evidence.discipline, of.markings, self.deadline)
         self._spaces.append((evidence.net, of, made))
-        return made
-
-    def _closed(self, net: Net, of: Markings) -> Closed:
-        for known_net, known, closed in self._sets:
-            if known_net is net and known is of:
-                return closed
-        made = Closed(net, of.markings, self.deadline)
-        self._sets.append((net, of, made))
         return made
 
     def _part(self, evidence: Evidence, of: Markings) -> Part:
@@ -280,26 +279,21 @@ class _Checker:
         return made
 
     def _listed(self, evidence: Evidence, of: Markings) -> Listed:
-        space = self._space(evidence, of)
+        space = self._space(evidence, of, one_by_one=True)
         if not isinstance(space, Listed):
-            raise TypeError("listed markings make no diagram")
+            raise TypeError("listed markings are gone through one by one")
         return space
 
     def _labelled(self, evidence: Evidence, of: Markings | Diagram, labels: tuple[Label, ...]) -> Checked:
         claim = evidence.claim
-        never = claim.kind is ClaimKind.NEVER and not labels and evidence.discipline is Discipline.INTERLEAVING
-        if never and isinstance(of, Markings) and len(of.markings) > EDGES_MAX:
-            closed = self._closed(evidence.net, of)
-            closed.require_never(claim.state_goal)
-            return Checked(shown=True, method=closed.method)
         space = self._space(evidence, of)
-        if isinstance(space, Diagrams):
+        if not isinstance(space, Listed):
             space.deadline = self.deadline
         if claim.kind is ClaimKind.NEVER and not labels:
             if isinstance(space, Diagrams) and isinstance(of, Diagram) and not space.is_cube(claim.state_goal):
                 return self._excluded(evidence, of, space)
             found = space.where(claim.state_goal)
-            if any(found) if isinstance(found, list) else found:
+            if found if isinstance(found, int) else any(found):
                 refuse(f"the goal ({format_formula(claim.state_goal)}) holds in a marking of the set")
             return Checked(shown=True, method=space.method)
         if claim.kind is ClaimKind.ORDERED:
@@ -337,7 +331,7 @@ class _Checker:
         return ""
 
 
-def _ordered(space: Listed | Diagrams) -> Checked:
+def _ordered(space: Listed | Closed | Diagrams) -> Checked:
     """Refuse a set of markings with a step that no order replays; under interleaving each firing is one."""
     if isinstance(space, Listed):
         steps = {fired for row in space.edges for fired, _ in row if len(fired) > 1}
@@ -348,7 +342,7 @@ def _ordered(space: Listed | Diagrams) -> Checked:
     return Checked(shown=True, method=f"{space.method}, and the steps put in order")
 
 
-def _require_initially(space: Listed | Diagrams, claim: Claim, labels: tuple[Label, ...]) -> None:
+def _require_initially(space: Listed | Closed | Diagrams, claim: Claim, labels: tuple[Label, ...]) -> None:
     """Refuse labels that do not show the claim of M0."""
     formula = as_ctl(claim)
     if formula is None:

@@ -20,6 +20,7 @@ from firable.analysis.evidence.certificate import (
     Diagram,
     FiringSequence,
     Labelling,
+    Markings,
     Reduction,
     Theorem,
     Unfolded,
@@ -44,6 +45,7 @@ from firable.analysis.evidence.producing.spaces import MARKINGS_MAX, WIDE_MAX, S
 from firable.analysis.evidence.producing.theorems import theorem_on
 from firable.analysis.evidence.producing.unfolding import unfolded_markings
 from firable.analysis.goal import Finding, Limits
+from firable.analysis.spaces.reachability import ReachabilityGraph
 from firable.analysis.spaces.space import StateSpace
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import Firable, Formula
@@ -160,9 +162,9 @@ class Certifier:
             return labelling(self.spaces.graph, self.spaces.markings, formula)
         if self.spaces.symbolic is not None and self.spaces.diagram is not None:
             return labelling(self.spaces.symbolic, self.spaces.diagram, formula)
-        if self.spaces.wide is not None and self.spaces.wide_markings is not None:
-            return labelling(self.spaces.wide, self.spaces.wide_markings, formula)
-        raise LackingError(f"there are more than {WIDE_MAX:,} markings, and no decision diagram of them at hand")
+        if self.spaces.many is not None and self.spaces.many_markings is not None:
+            return labelling(self.spaces.many, self.spaces.many_markings, formula, self.spaces.distances)
+        raise LackingError("there are more markings than are listed, and no decision diagram of them at hand")
 
     def _lost(self, goal: Formula, witness: Witness | None) -> Continuation | None:
         spelled = tidy(without_start(self.net, goal))
@@ -177,7 +179,7 @@ class Certifier:
         def lost(space: StateSpace[Any]) -> Any:
             return space.algebra.negation(space.backward(space.satisfying(goal)))
 
-        space: StateSpace[Any] | None = self.spaces.graph or self.spaces.symbolic
+        space = self.spaces.asked
         if space is not None and (
             witness is None or not space.contains(lost(space), self.net.marking(witness.marking))
         ):
@@ -190,12 +192,8 @@ class Certifier:
         places = tuple(replace(place, marked=bool(marking >> p & 1)) for p, place in enumerate(net.places))
         net = replace(net, places=places, properties=())
         spaces = Spaces(net, self.discipline, self.limits)
-        if (graph := spaces.graph) is not None and spaces.markings is not None:
-            if graph.satisfying(spelled).any():
-                return None
-            found = Continuation(way.firings, Labelling(spaces.markings))
-            self._ends.append((found, lambda other: not graph.satisfying(other).any()))
-            return found
+        if spaces.graph is not None:
+            return self._never_on(spaces.graph, spaces.markings, way, spelled)
         if self.spaces.symbolic is not None:
             symbolic = self.spaces.symbolic
             after = symbolic.engine.forward(
@@ -206,8 +204,20 @@ class Certifier:
             found = Continuation(way.firings, Labelling(_alone(drawn(symbolic, [after]))))
             self._ends.append((found, lambda other: not after & symbolic.satisfying(other)))
             return found
+        if self.spaces.many is not None and spaces.many is not None:
+            return self._never_on(spaces.many, spaces.many_markings, way, spelled)
         shown = Nevers(spaces).certificate(spelled)
         return None if shown is None else Continuation(way.firings, shown)
+
+    def _never_on(
+        self, graph: ReachabilityGraph, markings: Markings | None, way: Witness, goal: Formula
+    ) -> Continuation | None:
+        """The markings after a run as a closed set, where none of them meets the goal."""
+        if markings is None or graph.satisfying(goal).any():
+            return None
+        found = Continuation(way.firings, Labelling(markings))
+        self._ends.append((found, lambda other: not graph.satisfying(other).any()))
+        return found
 
     def never_fires(self, name: str) -> Reduction | None:
         """What shows on a smaller net that a transition is dead, where the run that decided left no markings behind."""
@@ -255,7 +265,9 @@ class Certifier:
                 net = replace(net, places=places, properties=())
             if self.discipline is Discipline.STEP:
                 raise LackingError(f"there are more than {MARKINGS_MAX:,} markings")
-            found, left = runs_by_search(net, tuple(names), Limits(self.spaces.part(0.5), self.limits.memory_bytes))
+            found, left = runs_by_search(
+                net, tuple(names), Limits(self.spaces.part_of_a_search(0.5), self.limits.memory_bytes)
+            )
             found += [self._run_firing(name, home) for name in left]
             return [FiringSequence((*prefix, *run)) for run in found]
         except NotFoundError as error:
@@ -293,7 +305,7 @@ class Certifier:
         try:
             if home is None:
                 raise LackingError("no home marking is known")
-            if (graph := self.spaces.graph or self.spaces.wide) is not None:
+            if (graph := self.spaces.many) is not None:
                 found = run_by_way_of(graph, home, graph.satisfying(goal))
             elif home == self.net.initial_marking:
                 way = self.spaces.way(lambda space: space.satisfying(goal))
@@ -308,7 +320,7 @@ class Certifier:
     def home(self) -> Marking | None:
         """A home marking, M0 if it is one; None where there is none or it is not known."""
         space: StateSpace[Any] | None = self.spaces.graph or (
-            self.spaces.symbolic if self.spaces.diagram is not None else self.spaces.wide
+            self.spaces.symbolic if self.spaces.diagram is not None else self.spaces.many
         )
         if space is None:
             return None
@@ -325,7 +337,7 @@ class Certifier:
 
     def parted(self) -> Formula | None:
         """Something that holds for ever from one marking and never again from another: why there is no home marking."""
-        space: StateSpace[Any] | None = self.spaces.graph or self.spaces.symbolic
+        space = self.spaces.asked
         return None if space is None else parting(space)
 
 

@@ -1,22 +1,23 @@
 """Labels of a formula of CTL, from any state space that holds all markings: found by the fixpoints that they certify.
 
-What a checker looks through once is computed here in rounds. A listed space gives each marking of a "least" fixpoint
-the round in which it came in as its rank. Of a diagram the rounds themselves are kept, since a set for each would be
-more than the evidence is worth: going back by one transition after the other, as long as one brings something new,
-takes fewer turns than by all at once, and the list of these transitions is all the checker needs. Nothing here is
-trusted.
+What a checker looks through once is computed here in rounds. On a graph the round in which a marking of a "least"
+fixpoint came in is its rank, and each edge is followed once (`distances`); a "greatest" one is what a "least" one
+leaves. Of a diagram the rounds themselves are kept, since a set for each would be more than the evidence is worth:
+going back by one transition after the other, as long as one brings something new, takes fewer turns than by all at
+once, and the list of these transitions is all the checker needs. Nothing here is trusted.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
 
 from firable.analysis._engine import BudgetExceeded
-from firable.analysis.evidence.certificate import Back, Diagram, Label, Labelling, Markings, Ranks, Root, Rounds, Whole
+from firable.analysis.evidence.certificate import Back, Diagram, Label, Labelling, Markings, Root, Rounds, Whole
 from firable.analysis.evidence.checking.labelling import (
     All,
     Greatest,
@@ -29,6 +30,7 @@ from firable.analysis.evidence.checking.labelling import (
     normal,
     parts_of,
 )
+from firable.analysis.evidence.producing.distances import Distances
 from firable.analysis.spaces.reachability import ReachabilityGraph
 from firable.analysis.spaces.space import StateSpace
 from firable.analysis.spaces.symbolic import SymbolicSpace
@@ -46,7 +48,7 @@ class TooLargeError(Exception):
 
 def listed(graph: ReachabilityGraph) -> Markings:
     """The markings of a complete graph."""
-    return Markings(tuple(map(graph.marking, graph.ascending)))
+    return Markings(tuple(graph.markings(graph.ascending)))
 
 
 def drawn(space: SymbolicSpace, sets: Sequence[Any] = ()) -> Diagram:
@@ -58,13 +60,16 @@ def drawn(space: SymbolicSpace, sets: Sequence[Any] = ()) -> Diagram:
     return Diagram(tuple(space.net.places[p].name for p in space.engine.order), tuple(rows), tuple(roots))
 
 
-def labelling(space: StateSpace[Any], whole: Markings | Diagram, formula: Temporal) -> Labelling | None:
+def labelling(
+    space: StateSpace[Any], whole: Markings | Diagram, formula: Temporal, distances: Distances | None = None
+) -> Labelling | None:
     """The labels that show a formula in M0; None where it does not hold. `whole` is the space as it is written.
 
-    Raises `TooLargeError`, `BudgetExceeded`.
+    `distances` are those of the space, if it is a graph of which they are at hand. Raises `TooLargeError`,
+    `BudgetExceeded`.
     """
     root = normal(formula)
-    made = _Labels(space, space.ascending if isinstance(space, ReachabilityGraph) else [])
+    made = _Labels(space, distances)
     if not space.contains(made.of(root), space.net.initial_marking):
         return None
     labels = tuple(made.labels[one] for one in fixpoints(root))
@@ -78,7 +83,7 @@ class _Labels:
     """The markings in which each part of a formula holds, and the label of each fixpoint."""
 
     space: StateSpace[Any]
-    order: list[int]  # in which the markings are listed, where they are
+    given: Distances | None = None
     known: dict[Node, Any] = field(default_factory=dict)
     labels: dict[Node, Label] = field(default_factory=dict)
     roots: list[Any] = field(default_factory=list)
@@ -112,27 +117,28 @@ class _Labels:
             return algebra.negation(self.space.before(algebra.negation(targets)))
         return self.space.before(targets)
 
+    @cached_property
+    def _distances(self) -> Distances | None:
+        return self.given or (Distances(self.space) if isinstance(self.space, ReachabilityGraph) else None)
+
     def _least(self, node: Node, through: Any, end: Any, *, every: bool) -> Any:
         space, algebra = self.space, self.space.algebra
-        if every:
-            through = algebra.conjunction([through, algebra.negation(space.deadlocks)])
-        elif isinstance(space, SymbolicSpace):
+        if self._distances is not None:
+            ranks = self._distances.until(through, end, every=every)
+            self.labels[node] = self._distances.written(ranks)
+            return ranks >= 0
+        if not every and isinstance(space, SymbolicSpace):
             return self._back(space, node, through, end)
-        found, size, rounds = end, space.count(end), [end]
+        through = algebra.conjunction([through, algebra.negation(space.deadlocks)])
+        found, size, rounds = end, space.count(end), 0
         while True:
-            more = algebra.conjunction([through, self._next(found, every=every)])
+            more = algebra.conjunction([through, self._next(found, every=True)])
             found = algebra.disjunction([found, more])
             before, size = size, space.count(found)
             if size == before:
                 break
-            rounds.append(found)
-        if isinstance(space, SymbolicSpace):
-            self.labels[node] = Rounds(len(rounds) - 1)
-        else:
-            ranks = np.full(space.n_markings, -1, dtype=np.int64)
-            for rank, column in reversed(list(enumerate(rounds))):
-                ranks[np.asarray(column)] = rank
-            self.labels[node] = Ranks(tuple(ranks[self.order].tolist()))
+            rounds += 1
+        self.labels[node] = Rounds(rounds)
         return found
 
     def _back(self, space: SymbolicSpace, node: Node, through: Any, end: Any) -> Any:
@@ -164,6 +170,11 @@ class _Labels:
 
     def _greatest(self, node: Node, end: Any, through: Any, *, every: bool) -> Any:
         space, algebra = self.space, self.space.algebra
+        if self._distances is not None:
+            not_end, not_through = algebra.negation(end), algebra.negation(through)
+            found = self._distances.until(not_end, not_through, every=not every) < 0
+            self.labels[node] = Whole() if found.all() else self._distances.written(np.where(found, 0, -1))
+            return found
         found, size = through, space.count(through)
         while size:
             stays = [end, self._next(found, every=every), *([] if every else [space.deadlocks])]
@@ -173,9 +184,7 @@ class _Labels:
                 break
         if size == space.n_markings:
             self.labels[node] = Whole()
-        elif isinstance(space, SymbolicSpace):
+        else:
             self.roots.append(found)
             self.labels[node] = Root(len(self.roots))
-        else:
-            self.labels[node] = Ranks(tuple(np.where(np.asarray(found), 0, -1)[self.order].tolist()))
         return found

@@ -79,14 +79,14 @@ class Nevers:
         return None if symbolic is None or diagram is None or symbolic.satisfying(goal) else Labelling(diagram)
 
     def _on_many(self, goal: Formula) -> Labelling | None:
-        graph, many = self.spaces.given, self.spaces.many
-        return None if many is None or graph is None or graph.count(graph.satisfying(goal)) else Labelling(many)
+        graph, many = self.spaces.many, self.spaces.many_markings
+        return None if many is None or graph is None or graph.satisfying(goal).any() else Labelling(many)
 
     def reduced(self, goal: Formula) -> Reduction | None:
         """The goal shown of a smaller net, in half of the time that is left."""
         if self.discipline is Discipline.STEP:
             return None
-        limits = Limits(self.spaces.part(0.5), self.spaces.limits.memory_bytes)
+        limits = Limits(self.spaces.part_of_a_search(0.5), self.spaces.limits.memory_bytes)
 
         def never(small: Net, of: Formula) -> Plain | None:
             return Nevers(Spaces(small, Discipline.INTERLEAVING, limits))._plain(of)
@@ -101,7 +101,9 @@ class Nevers:
         if self.discipline is Discipline.STEP:
             return None
         try:
-            return stubborn_sets(self.net, goal, Limits(self.spaces.part(0.2), self.spaces.limits.memory_bytes))
+            return stubborn_sets(
+                self.net, goal, Limits(self.spaces.part_of_a_search(0.2), self.spaces.limits.memory_bytes)
+            )
         except BudgetExceeded:
             return None
 

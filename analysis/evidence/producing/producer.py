@@ -34,6 +34,7 @@ from firable.analysis.evidence.meaning import (
 )
 from firable.analysis.evidence.producing.claims import Certifier
 from firable.analysis.evidence.producing.lacking import LackingError
+from firable.analysis.evidence.producing.room import Room
 from firable.analysis.evidence.read_off import eager_cycle, read_off
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.report import CheckReport
@@ -83,6 +84,7 @@ class _Verdicts:
         self.certifier, self.queries, self.findings = certifier, queries, findings
         self.net = certifier.net
         self._live: dict[tuple[str, ...], Shown | str] = {}
+        self._room = Room()
 
     def record(self, verdict: Verdict) -> Record:
         """What shows a decided verdict, or why nothing does."""
@@ -94,6 +96,8 @@ class _Verdicts:
                 shown = list(self._shown(verdict, query, proved))
             except LackingError as error:
                 lacking = str(error)
+        if not self._room.take([certificate for _, certificate in shown]):
+            shown, lacking = [], "the document would be larger than what is read"
         claims = [claim for claim, _ in shown]
         if not lacking and not suffices(net, discipline, verdict.name, proved, claims, query):
             lacking = "no certificate is known for this verdict"

@@ -60,7 +60,7 @@ def progress(graph: ReachabilityGraph, space: Markings, claim: Claim) -> Progres
     names = graph.net.transitions
     return Progress(
         space,
-        tuple(ranks.get(i, ()) for i in graph.ascending),
+        tuple(ranks.get(i, ()) for i in graph.ascending.tolist()),
         tuple((rank, names[t].name) for rank, t in sorted(helpful.items())),
     )
 

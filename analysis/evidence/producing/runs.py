@@ -6,8 +6,8 @@ begin. On nets too large for that, walks and searches by stubborn sets give such
 best on the net reduced for liveness.
 
 That there is no home marking is shown by a formula: it holds for ever from one marking and never again from another.
-Of a bottom component a place that never changes in it, and not in another, will do; else its markings, if they are
-few.
+Of a bottom component a place that never changes in it will do, if another component cannot have it so; else all such
+places together; else its markings, if they are few.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from firable.analysis.reduction.reduce import reduce_for_liveness
 from firable.analysis.spaces.reachability import ReachabilityGraph
 from firable.analysis.spaces.space import StateSpace
 from firable.analysis.stubborn import find_firings
-from firable.nets.formula import Formula, Holds, Not, Or
+from firable.nets.formula import And, Formula, Holds, Not, Or
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import Witness
 from firable.semantics.player import Player
@@ -198,14 +198,13 @@ def parting(space: StateSpace[Any]) -> Formula | None:
     elsewhere = algebra.negation(space.backward(one))
     if not space.count(elsewhere):
         return None
+    steady = list[Formula]()
     for p, place in enumerate(net.places):
-        full = space.marked(p)
-        inside = space.count(algebra.conjunction([one, full]))
-        if inside not in {0, space.count(one)}:
-            continue
-        formula: Formula = Holds(place.name) if inside else Not(Holds(place.name))
-        holds = space.satisfying(formula)
-        if space.count(algebra.negation(space.backward(holds))):
+        inside = space.count(algebra.conjunction([one, space.marked(p)]))
+        if inside in {0, space.count(one)}:
+            steady.append(Holds(place.name) if inside else Not(Holds(place.name)))
+    for formula in (*steady, *([tidy(And(tuple(steady)))] if steady else [])):
+        if space.count(algebra.negation(space.backward(space.satisfying(formula)))):
             return formula
     if space.count(one) > PARTING_MAX:
         return None

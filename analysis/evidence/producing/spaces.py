@@ -13,7 +13,9 @@ from typing import Any, Final
 from firable.analysis._engine import BudgetExceeded
 from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.certificate import Diagram, Markings
+from firable.analysis.evidence.claim_records import steps_of
 from firable.analysis.evidence.claims import is_marking
+from firable.analysis.evidence.producing.distances import Distances
 from firable.analysis.evidence.producing.labels import TooLargeError, drawn, listed
 from firable.analysis.goal import Limits
 from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
@@ -26,13 +28,14 @@ from firable.semantics.trace import Discipline
 MARKINGS_MAX: Final = 20_000
 """How many markings are listed where a decision diagram would do as well."""
 WIDE_MAX: Final = 100_000
-"""How many markings are listed where none would, or none is at hand: for responses, LTL, synchronous steps, CTL."""
-MANY_MAX: Final = 400_000
-"""How many markings are listed where no firings of them need to be kept, for what is never so."""
-DIGITS_MAX: Final = 2**25
-"""How many hexadecimal digits these may take."""
+"""How many markings are listed where none would: for responses, LTL, synchronous steps."""
+MANY_MAX: Final = 2_000_000
+"""How many markings are listed where no diagram is at hand, and they are looked through in arrays."""
+WORDS_MAX: Final = 2**25
+"""How many words of 64 bits these may take."""
+DIGITS_MAX: Final = 2**26
+"""How many hexadecimal digits they may take as they are written."""
 _SECONDS: Final = 30.0
-_CLOCK_EVERY: Final = 4_096
 
 
 class Spaces:
@@ -45,6 +48,12 @@ class Spaces:
         """A part of the time that is left for evidence."""
         left = self.limits.deadline.left_seconds
         return self.limits.deadline.within(_SECONDS if left is None else left * share)
+
+    def part_of_a_search(self, share: float) -> Deadline:
+        """The same for something smaller than all markings: less of it where these are at hand, and may be listed."""
+        graph = self.given
+        held = isinstance(graph, ReachabilityGraph) and graph.complete and graph.n_markings <= MANY_MAX
+        return self.part(share / 4 if held else share)
 
     @cached_property
     def graph(self) -> ReachabilityGraph | None:
@@ -76,19 +85,30 @@ class Spaces:
         return self.markings or (None if self.wide is None else listed(self.wide))
 
     @cached_property
-    def many(self) -> Markings | None:
-        """All markings of a graph that is at hand, if they are not too many for a set that is closed, and no more."""
-        graph = self.given
-        if not isinstance(graph, ReachabilityGraph) or not graph.complete or self.discipline is Discipline.STEP:
-            return None
-        if graph.n_markings > MANY_MAX or graph.n_markings * -(-len(self.net.places) // 4) > DIGITS_MAX:
-            return None
-        found = list[Marking]()
-        for i in range(graph.n_markings):
-            if i % _CLOCK_EVERY == 0 and self.limits.deadline.over:
-                return None
-            found.append(graph.marking(i))
-        return Markings(tuple(sorted(found)))
+    def many(self) -> ReachabilityGraph | None:
+        """The same, where no diagram is at hand: as many as are looked through in arrays."""
+        if self.discipline is Discipline.STEP:
+            return self.wide
+        words = -(-len(self.net.places) // 64)
+        return self.wide or self._explored(min(MANY_MAX, WORDS_MAX // max(1, words)))
+
+    @cached_property
+    def many_markings(self) -> Markings | None:
+        """The markings of `many` as they are written, where that is not too much."""
+        if self.wide_markings is not None or self.many is None:
+            return self.wide_markings
+        found = listed(self.many)
+        return found if sum(step.bit_length() + 3 for step in steps_of(found.markings)) <= 4 * DIGITS_MAX else None
+
+    @cached_property
+    def distances(self) -> Distances | None:
+        """The edges of `many`, turned round."""
+        return None if self.many is None else Distances(self.many)
+
+    @cached_property
+    def asked(self) -> StateSpace[Any] | None:
+        """All markings, for questions about them: the first of few, a diagram, and many."""
+        return self.graph or self.symbolic or self.many
 
     @cached_property
     def symbolic(self) -> SymbolicSpace | None:
@@ -98,7 +118,7 @@ class Spaces:
         if isinstance(self.given, SymbolicSpace):
             return self.given.until(self.limits.deadline)
         try:
-            return explore_symbolically(self.net, Limits(self.part(0.3), self.limits.memory_bytes)).until(
+            return explore_symbolically(self.net, Limits(self.part_of_a_search(0.3), self.limits.memory_bytes)).until(
                 self.limits.deadline
             )
         except BudgetExceeded:
@@ -114,7 +134,7 @@ class Spaces:
 
     def way(self, targets: Callable[[StateSpace[Any]], Any]) -> Witness | None:
         """A way into a set, from whichever space there is."""
-        space: StateSpace[Any] | None = self.graph or self.symbolic or self.given
+        space = self.graph or self.symbolic or self.given
         return None if space is None else space.witness(targets(space))
 
     def way_to(self, marking: Marking) -> Witness | None:
