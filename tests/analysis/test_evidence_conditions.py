@@ -92,9 +92,11 @@ LABELS: dict[str, Callable[[], Evidence]] = {
     "the way is not through": lambda: listed(LOOP, "E[z U b]", ["a", "b"], 1, 0),
     "one next marking has no rank": lambda: listed(FORK, "AF b", ["a", "b", "c"], 1, 0, -1),
     "until every next ends in a deadlock": lambda: listed(ENDING, "AF (a and b)", ["a", "b"], 2, 1),
+    "a deadlock is not the end": lambda: listed(ENDING, "AF (a and b)", ["a", "b"], 1, 0),
     "it ends with the next": lambda: listed(LOOP, "EG a", ["a", "b"], 0, -1),
     "it does not hold throughout": lambda: listed(LOOP, "EG a", ["a", "b"], 0, 0),
     "always is left": lambda: listed(LOOP, "AG a", ["a", "b"], 0, -1),
+    "another one than M0 has a rank": lambda: listed(ENDING, "EG b", ["a", "b"], -1, 0),
     "M0 has no rank": lambda: listed(LOOP, "EF z", ["a", "b"], -1, -1),
     "a label too few": lambda: listed(LOOP, "EF z", ["a", "b"]),
     "a rank too few": lambda: listed(LOOP, "EF z", ["a", "b"], 0),
@@ -134,22 +136,40 @@ def test_a_large_set_is_in_order_each_marking_once(markings: tuple[int, ...], mo
         check_evidence(never(LOOP, "a and b", Markings(markings)))
 
 
+class Same:
+    """Keys that are all the same: no firing of a loop changes the hash."""
+
+    def __init__(self, n_places: int) -> None:
+        self.n_places = n_places
+
+    def integers(self, *_: object, dtype: type) -> object:
+        return np.ones(self.n_places, dtype=dtype)
+
+
 def test_a_marking_is_not_taken_for_another_one_with_the_same_hash(monkeypatch: pytest.MonkeyPatch) -> None:
     of = widened(LOOP)
     marking, after = of.initial_marking, of.initial_marking ^ of.marking(("a", "b"))
     evidence = [never(of, "a and b", Markings(markings)) for markings in [(marking, after), (marking,)]]
     monkeypatch.setattr("firable.analysis.evidence.checking.checker.EDGES_MAX", 0)
     assert check_evidence(evidence[0]).shown
-
-    class Same:
-        """Keys that are all the same: no firing of the loop changes the hash."""
-
-        def integers(self, *_: object, dtype: type) -> object:
-            return np.ones(len(of.places), dtype=dtype)
-
-    monkeypatch.setattr(np.random, "default_rng", lambda _: Same())
+    monkeypatch.setattr(np.random, "default_rng", lambda _: Same(len(of.places)))
     with pytest.raises(InputError, match="leads out of the set"):
         check_evidence(evidence[1])
+
+
+def test_two_markings_with_one_hash_get_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    of, drawn = widened(LOOP), np.random.default_rng
+    begun: list[int] = []
+
+    def first_the_same(seed: int) -> object:
+        begun.append(seed)
+        return drawn(seed) if seed else Same(len(of.places))
+
+    monkeypatch.setattr("firable.analysis.evidence.checking.checker.EDGES_MAX", 0)
+    monkeypatch.setattr(np.random, "default_rng", first_the_same)
+    both = of.initial_marking, of.initial_marking ^ of.marking(("a", "b"))
+    assert check_evidence(never(of, "a and b", Markings(both))).shown
+    assert begun == [0, 1]
 
 
 def test_a_large_set_that_is_closed_is_shown_in_columns(monkeypatch: pytest.MonkeyPatch) -> None:
