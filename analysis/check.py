@@ -129,7 +129,10 @@ class _Check:
 
     def automatically(self) -> CheckReport:
         """The report of the three stages, as far as they are needed."""
-        first = self._explore(replace(self.budget, markings=min(FIRST_MARKINGS, self.budget.markings)))
+        try:
+            first = self._explore(replace(self.budget, markings=min(FIRST_MARKINGS, self.budget.markings)))
+        except InputError as error:
+            return self._without_a_graph(error)
         if first.complete or first.engine.reason == "interrupted":
             return _told(self._report(first), [f"explored: {_size(first)}"])
         course = [f"the first {first.n_markings:,} markings are not all"]
@@ -143,6 +146,20 @@ class _Check:
         late = {Method.COMPACT: _COUNTING_SHARE} if {"memory", "markings"} & set(ends) else {}
         report = self._report(space or first, settling.found if space is None else settling.shown())
         return self._settled(report, settling, FIRST_KNOWERS | late, (*GOAL_LANES, *FORMULA_LANES), course)
+
+    def _without_a_graph(self, error: InputError) -> CheckReport:
+        """The report on a net of which the explicit engine has no room for the masks, let alone for markings.
+
+        Raises the error where no other technique holds its markings.
+        """
+        course = ["the explicit engine has no room for the net itself"]
+        for of in SPACES.values():
+            try:
+                space = of.load()(self.net, Limits(self.deadline, self.budget.memory_bytes))
+            except BudgetExceeded:
+                continue
+            return _told(self._report(space), [*course, f"{of.words}: {_size(space)}"])
+        raise error
 
     def _begin(self, settling: Settling, deadline: Deadline) -> None:
         """Settle, beside the search for all markings, what others follow from, by quick techniques."""
@@ -249,15 +266,18 @@ class _Check:
     def _held_explicitly(self, is_alone: Callable[[], bool], ends: list[str | None], limits: Limits) -> StateSpace[Any]:
         """The graph, by a second thread too once nothing else wants a processor."""
         budget = replace(self.budget, memory_bytes=limits.memory_bytes, seconds=None)
-        graph = explore(
-            self.net,
-            self.discipline,
-            budget,
-            deadline=limits.deadline,
-            progress=self.progress,
-            threads=2,
-            second_free=is_alone,
-        )
+        try:
+            graph = explore(
+                self.net,
+                self.discipline,
+                budget,
+                deadline=limits.deadline,
+                progress=self.progress,
+                threads=2,
+                second_free=is_alone,
+            )
+        except InputError as error:  # a part of the memory does not hold the net itself, and others may need less
+            raise BudgetExceeded(error.diagnostics[0].message) from None
         ends.append(graph.engine.reason)
         graph.require_complete()
         return graph

@@ -344,7 +344,9 @@ def explore(
         graph = _explored(net, discipline, budget, deadline, progress, threads, second_free)
     except BudgetExceeded:
         message = f"the budget of {budget.memory_bytes:,} bytes does not hold the net itself, let alone its markings"
-        raise InputError([Diagnostic("F3004", message, "give it a larger budget of memory")]) from None
+        raise InputError(
+            [Diagnostic("F3004", message, "give it a larger budget of memory, or the method `symbolic`")]
+        ) from None
     return ReachabilityGraph(net, discipline, budget, graph, deadline)
 
 
@@ -357,6 +359,8 @@ def _explored(
     threads: int,
     second_free: Callable[[], bool] | None,
 ) -> _engine.Graph:
+    if 8 * -(-len(net.places) // 64) * len(net.transitions) > budget.memory_bytes:
+        raise BudgetExceeded(REASONS["memory"])  # the engine would find that out after it had taken them
     limits = engine_limits(deadline)
     limits["max_seconds"] = min((t for t in (limits["max_seconds"], budget.seconds) if t is not None), default=None)
     return _engine.explore(

@@ -172,6 +172,25 @@ def test_two_markings_with_one_hash_get_others(monkeypatch: pytest.MonkeyPatch) 
     assert begun == [0, 1]
 
 
+@pytest.mark.parametrize("edges_max", [100_000, 0])
+@pytest.mark.parametrize(
+    "evidence",
+    [
+        listed(ENDING, "EG (a or b)", ["a", "b"], 0, 0),  # a run ends well
+        listed(ENDING, "AG (a or b)", ["a", "b"], 0, 0),
+        listed(ENDING, "not E[not a U b]", ["a", "b"], 0, -1),  # an always that is over
+        listed(ENDING, "not A[not a U b]", ["a", "b"], 0, -1),
+        listed(LOOP, "EX b and AX b", ["a", "b"]),
+    ],
+    ids=str,
+)
+def test_labels_that_say_what_is_true_show_it(
+    edges_max: int, evidence: Evidence, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("firable.analysis.evidence.checking.checker.EDGES_MAX", edges_max)
+    assert check_evidence(evidence).shown
+
+
 def test_a_large_set_that_is_closed_is_shown_in_columns(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("firable.analysis.evidence.checking.checker.EDGES_MAX", 0)
     found = check_evidence(never(LOOP, "a and b", Markings((1, 2))))

@@ -6,9 +6,12 @@ whatever recurses would run out of its stack.
 
 from dataclasses import replace
 
+import pytest
+
 from firable.analysis.check import check
 from firable.analysis.spaces.reachability import Budget, explore
 from firable.nets.catalogue import family_net
+from firable.nets.diagnostics import InputError
 from firable.nets.formula import NESTING_MAX, parse_formula
 from firable.nets.net import Net, Place, Property, PropertyKind, Transition
 from firable.nets.verdict import Status
@@ -70,3 +73,22 @@ def test_a_net_of_a_hundred_thousand_transitions_is_explored() -> None:
     transitions = tuple(Transition(f"t{t}", (f"p{t % n}",), (f"p{(t % n + 1 + t // n) % n}",)) for t in range(100_000))
     graph = explore(Net("wide", places, transitions), budget=Budget(markings=2_000))
     assert (graph.complete, graph.n_markings, graph.n_edges) == (True, n, 100_000)
+
+
+@pytest.mark.parametrize(
+    ("machines", "told"),
+    [
+        (2000, "explicit engine gave up: the budget of 2,097,152 bytes does not hold the net itself"),
+        (4000, "the explicit engine has no room for the net itself"),
+    ],
+)
+def test_a_net_too_wide_for_the_explicit_engine_is_decided_by_a_diagram(machines: int, told: str) -> None:
+    report = check(family_net(f"machines-{machines}"), budget=Budget(memory_bytes=2**22))
+    assert any(line.startswith(told) for line in report.course)
+    assert report.figures.markings == 2**machines
+    assert report.verdict("reversible").status is Status.PROVED
+
+
+def test_a_net_that_no_technique_has_room_for_is_refused() -> None:
+    with pytest.raises(InputError, match="does not hold the net itself"):
+        check(family_net("machines-4000"), budget=Budget(memory_bytes=2**16))
