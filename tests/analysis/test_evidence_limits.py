@@ -23,7 +23,7 @@ from firable.analysis.evidence.certificate import (
 )
 from firable.analysis.evidence.checking.checker import check_document, check_evidence
 from firable.analysis.evidence.checking.obligation import Evidence
-from firable.analysis.evidence.checking.obligations import obligations
+from firable.analysis.evidence.checking.obligations import obligations, played
 from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.analysis.evidence.document import Document, Record, document_from_text, seal
 from firable.analysis.evidence.meaning import suffices
@@ -32,6 +32,7 @@ from firable.analysis.evidence.producing.claims import Certifier
 from firable.analysis.evidence.producing.lacking import LackingError
 from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.evidence.producing.room import Room
+from firable.analysis.evidence.producing.runs import runs_by_search
 from firable.analysis.evidence.refusal import TimeIsOverError
 from firable.analysis.goal import Limits
 from firable.nets.catalogue.families import family_net
@@ -223,3 +224,21 @@ def test_steps_of_a_large_set_are_refused_where_they_make_none(
     data["sets"][0]["markings"] = steps
     with pytest.raises(InputError, match=reason):
         document_from_text(json.dumps({**data, "seal": seal(data)}))
+
+
+def test_a_net_of_many_parts_fires_all_its_transitions_in_few_runs() -> None:
+    net = family_net("machines-300")
+    names = [transition.name for transition in net.transitions]
+    runs, left = runs_by_search(net, names, Limits())
+    assert left == []
+    assert {name for run in runs for fired in run for name in fired} == set(names)
+    assert len(runs) <= 3
+    assert sum(map(len, runs)) <= 4 * len(names)
+    for run in runs:
+        played(net, Discipline.INTERLEAVING, run)
+
+
+def test_runs_are_not_looked_for_when_the_time_is_over() -> None:
+    net = family_net("machines-8")
+    with pytest.raises(BudgetExceeded):
+        runs_by_search(net, [transition.name for transition in net.transitions], Limits(Deadline.after(0)))

@@ -1,7 +1,7 @@
 """How much room the certificates of a document take, so that none is written that is too large to be read.
 
-Counted are the sets of markings, each once, and the ranks: all else is small beside the limit. What finds no room any
-more is left out, with the reason; what comes after it may still find some.
+Counted are the sets of markings and the runs, each once, and the ranks: all else is small beside the limit. What finds
+no room any more is left out, with the reason; what comes after it may still find some.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import Final
 from firable.analysis.evidence.certificate import (
     Certificate,
     Continuation,
+    FiringSequence,
     Labelling,
     Markings,
     Progress,
@@ -26,6 +27,9 @@ from firable.analysis.evidence.document import SIZE_BYTES_MAX
 
 _REST_BYTES: Final = 2**24
 _BETWEEN_BYTES: Final = 3  # quotes and a comma
+_AROUND_BYTES: Final = 6  # and the brackets around a firing
+
+_Large = Markings | Ranks | FiringSequence
 
 
 class Room:
@@ -33,7 +37,7 @@ class Room:
 
     def __init__(self, size: int = SIZE_BYTES_MAX - _REST_BYTES) -> None:
         self.left = size
-        self._written: dict[int, Markings | Ranks] = {}  # kept, so that no number is given to another one
+        self._written: dict[int, _Large] = {}  # kept, so that no number is given to another one
 
     def take(self, certificates: list[Certificate]) -> bool:
         """Whether there is room for certificates, which then is taken."""
@@ -46,8 +50,10 @@ class Room:
         return True
 
 
-def _large(certificate: Certificate) -> Iterator[Markings | Ranks]:
+def _large(certificate: Certificate) -> Iterator[_Large]:
     match certificate:
+        case FiringSequence():
+            yield certificate
         case Labelling(space, labels):
             yield from (part for part in (space, *labels) if isinstance(part, Markings | Ranks))
         case StubbornSets(space) | Progress(space) | Unfolded(space):
@@ -60,7 +66,10 @@ def _large(certificate: Certificate) -> Iterator[Markings | Ranks]:
             yield from _large(then)
 
 
-def _size(part: Markings | Ranks) -> int:
+def _size(part: _Large) -> int:
+    if isinstance(part, FiringSequence):
+        names = (name for fired in (*part.firings, *part.cycle) for name in fired)
+        return sum(len(name.encode()) + _AROUND_BYTES for name in names)
     if isinstance(part, Ranks):
         return sum(len(str(rank)) + 1 for rank in part.ranks)
     written = steps_of(part.markings) if len(part.markings) > APART_MAX else part.markings

@@ -13,6 +13,7 @@ places together; else its markings, if they are few.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from typing import Any, Final
 
@@ -20,8 +21,10 @@ import numpy as np
 
 from firable.analysis._engine import BudgetExceeded
 from firable.analysis.compiled import engine_limits
+from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.certificate import FiringSequence
 from firable.analysis.evidence.claims import is_marking, tidy
+from firable.analysis.evidence.producing.lacking import NO_TIME
 from firable.analysis.goal import Limits
 from firable.analysis.reduction.reduce import reduce_for_liveness
 from firable.analysis.spaces.reachability import ReachabilityGraph
@@ -30,7 +33,9 @@ from firable.analysis.stubborn import find_firings
 from firable.nets.formula import And, Formula, Holds, Not, Or
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import Witness
-from firable.semantics.player import Player
+from firable.semantics.algebra import BOOL
+from firable.semantics.firing import firable
+from firable.semantics.player import Player, holds_in
 from firable.semantics.trace import Discipline
 
 Run = tuple[tuple[str, ...], ...]
@@ -166,11 +171,37 @@ def runs_by_search(net: Net, names: Sequence[str], limits: Limits) -> tuple[list
         able = [(moments[image], name) for name in wanted if (image := images[name]) in moments and image is not None]
         # The last ones first: the ways to them lead past others.
         for _, name in sorted(able, reverse=True):
+            if limits.deadline.over:
+                raise BudgetExceeded(NO_TIME)
             image = images[name]
             if name in wanted and image is not None and (witness := found.witness(image)) is not None:
-                runs.append((*witness.firings[:-1], (name,)))
+                runs.append(_gone_on(net, (*witness.firings[:-1], (name,)), wanted, limits.deadline))
                 wanted -= {one for fired in runs[-1] for one in fired}
     return runs, sorted(wanted)
+
+
+def _gone_on(net: Net, run: Run, wanted: AbstractSet[str], deadline: Deadline) -> Run:
+    """The run, gone on with by transitions that are wanted, as long as many of them may fire.
+
+    A net of thousands of parts would else have a run for each, past all others.
+    """
+    player, marking = Player(net), net.initial_marking
+    for (name,) in run:
+        marking = player.fire(marking, (net.transition_index[name],))
+    fired = {name for (name,) in run}
+    open_ = sorted(net.transition_index[name] for name in wanted - fired if net.transition(name).openable)
+    more, fruitful = list(run), True
+    while fruitful and open_ and not deadline.over:
+        left = []
+        for t in open_:
+            if firable(BOOL, net, t, holds_in(marking)):
+                marking = player.fire(marking, (t,))
+                more.append((net.transitions[t].name,))
+            else:
+                left.append(t)
+        fruitful = len(open_) - len(left) > len(open_) // 8
+        open_ = left
+    return tuple(more)
 
 
 def maximal(net: Net, discipline: Discipline, witness: Witness) -> FiringSequence | None:
