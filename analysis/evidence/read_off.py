@@ -6,15 +6,18 @@ so each look ends with a deadline, as everything does that is checked.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from collections.abc import Set as AbstractSet
 from typing import Final
 
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.refusal import in_time
-from firable.nets.net import Net, SignalKind, Transition
+from firable.nets.net import Marking, Net, SignalKind, Transition
+from firable.semantics.algebra import BOOL
 from firable.semantics.arbitration import Arbitration
 from firable.semantics.conflict import conflicts, gate_races, jointly_openable, structural_conflicts
-from firable.semantics.player import Player
+from firable.semantics.firing import firable
+from firable.semantics.player import Player, holds_in
 from firable.semantics.trace import Discipline
 
 STEPS_MAX: Final = 100_000
@@ -71,8 +74,10 @@ def eager_cycle(net: Net, deadline: Deadline = NEVER) -> frozenset[str] | None:
     seen = {(marking, turns): 0}
     fired: list[tuple[int, ...]] = []
     timers = {signal.name for signal in net.signals if signal.kind is SignalKind.TIMER}
+    able = [t for t, one in enumerate(net.transitions) if one.openable and not _waits_for(one, timers)]
+    may_fire = _MayFire(net, able)
     for _ in in_time(range(STEPS_MAX), deadline):
-        enabled = [t for t in player.may_fire(marking) if not _waits_for(net.transitions[t], timers)]
+        enabled = may_fire.at(marking)
         if not enabled:
             return _never_called(net, timers)
         if not jointly_openable(net, enabled):
@@ -85,6 +90,37 @@ def eager_cycle(net: Net, deadline: Deadline = NEVER) -> frozenset[str] | None:
                 net, timers
             )
     return None
+
+
+class _MayFire:
+    """Which of some transitions are firable, marking after marking: only those are asked of which a place changed."""
+
+    def __init__(self, net: Net, able: Iterable[int]) -> None:
+        self.net, self.marking = net, net.initial_marking
+        self.beside: list[list[int]] = [[] for _ in net.places]
+        self.found = set[int]()
+        for t in able:
+            one = net.transitions[t]
+            for name in {*one.inputs, *one.outputs, *one.permissive, *one.inhibitive}:
+                self.beside[net.place_index[name]].append(t)
+            self._ask(t)
+
+    def at(self, marking: Marking) -> list[int]:
+        """Those that are firable in the next marking."""
+        changed, self.marking = self.marking ^ marking, marking
+        again = set[int]()
+        while changed:
+            again.update(self.beside[changed.bit_length() - 1])
+            changed ^= 1 << changed.bit_length() - 1
+        for t in again:
+            self._ask(t)
+        return sorted(self.found)
+
+    def _ask(self, t: int) -> None:
+        if firable(BOOL, self.net, t, holds_in(self.marking)):
+            self.found.add(t)
+        else:
+            self.found.discard(t)
 
 
 def _waits_for(transition: Transition, timers: AbstractSet[str]) -> bool:

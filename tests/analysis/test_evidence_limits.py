@@ -3,6 +3,7 @@
 import json
 import random
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from support.evidence_examples import EXAMPLES, LOOP, RACING
@@ -32,15 +33,18 @@ from firable.analysis.evidence.producing.claims import Certifier
 from firable.analysis.evidence.producing.lacking import LackingError
 from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.evidence.producing.room import Room
-from firable.analysis.evidence.producing.runs import runs_by_search
+from firable.analysis.evidence.producing.runs import runs_by_search, runs_on_graph
+from firable.analysis.evidence.read_off import eager_cycle
 from firable.analysis.evidence.refusal import TimeIsOverError
 from firable.analysis.goal import Limits
+from firable.analysis.spaces.reachability import ReachabilityGraph, explore
 from firable.nets.catalogue.families import family_net
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import And, Holds
 from firable.nets.net import Command, Net, Place, Transition
 from firable.nets.queries import parse_query
 from firable.nets.temporal import parse_temporal
+from firable.semantics.firing import firable
 from firable.semantics.trace import Discipline
 
 STILL = Net("still", tuple(Place(f"p{i}", marked=i % 2 == 0) for i in range(60)))
@@ -242,3 +246,38 @@ def test_runs_are_not_looked_for_when_the_time_is_over() -> None:
     net = family_net("machines-8")
     with pytest.raises(BudgetExceeded):
         runs_by_search(net, [transition.name for transition in net.transitions], Limits(Deadline.after(0)))
+
+
+def test_the_arbitrated_run_costs_what_happens_in_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = 0
+
+    def counted(*of: Any) -> Any:
+        nonlocal asked
+        asked += 1
+        return firable(*of)
+
+    monkeypatch.setattr("firable.analysis.evidence.read_off.firable", counted)
+    net = ring(200)
+    assert eager_cycle(net) == frozenset(transition.name for transition in net.transitions)
+    assert asked <= 5 * len(net.transitions)
+
+
+def test_each_transition_is_asked_where_it_fires_a_few_times_on_a_graph(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked, may_fire = 0, ReachabilityGraph.may_fire
+
+    def counted(graph: ReachabilityGraph, t: int) -> Any:
+        nonlocal asked
+        asked += 1
+        return may_fire(graph, t)
+
+    monkeypatch.setattr(ReachabilityGraph, "may_fire", counted)
+    net = ring(200)
+    (run,) = runs_on_graph(explore(net), list(net.transition_index), None)
+    assert len(run.firings) == len(net.transitions)
+    assert asked <= 2 * len(net.transitions)
+
+
+def ring(n: int) -> Net:
+    """One token that goes round so many places."""
+    places = tuple(Place(f"p{i}", marked=i == 0) for i in range(n))
+    return Net("ring", places, tuple(Transition(f"t{i}", (f"p{i}",), (f"p{(i + 1) % n}",)) for i in range(n)))

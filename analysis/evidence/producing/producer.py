@@ -33,9 +33,10 @@ from firable.analysis.evidence.meaning import (
     tokens_at_least,
 )
 from firable.analysis.evidence.producing.claims import Certifier
-from firable.analysis.evidence.producing.lacking import LackingError
+from firable.analysis.evidence.producing.lacking import NO_TIME, LackingError
 from firable.analysis.evidence.producing.room import Room
 from firable.analysis.evidence.read_off import eager_cycle, read_off
+from firable.analysis.evidence.refusal import TimeIsOverError
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.report import CheckReport
 from firable.analysis.verdicts.behaviour import DEADLOCK_FREE
@@ -296,7 +297,10 @@ class _Verdicts:
         raise LackingError("that no other command follows in any run is not certified")
 
     def _served(self, proved: bool) -> Iterator[tuple[Claim, Certificate]]:
-        again = eager_cycle(self.net) or ()
+        try:
+            again = eager_cycle(self.net, self.certifier.limits.deadline) or ()
+        except TimeIsOverError:
+            raise LackingError(NO_TIME) from None
         waiting = [t.name for t in self.net.transitions if t.name not in again]
         if not proved:
             for name in waiting:

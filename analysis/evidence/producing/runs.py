@@ -54,6 +54,9 @@ class NotFoundError(Exception):
 def runs_on_graph(graph: ReachabilityGraph, names: Sequence[str], home: Marking | None) -> list[FiringSequence]:
     """Runs of a complete graph that fire these transitions, each after it met the home marking, if one is given."""
     open_ = {graph.net.transition_index[name] for name in names}
+    may = np.zeros(graph.n_markings, dtype=np.uint32)  # how many of them may fire: kept, since it is asked at each step
+    for t in open_:
+        may += graph.may_fire(t)
     runs = []
     while open_:
         run = _Run(graph)
@@ -61,7 +64,9 @@ def runs_on_graph(graph: ReachabilityGraph, names: Sequence[str], home: Marking 
             run.go(_column(graph, [index]))
             run.fired.clear()  # what fired on the way there does not count
         before = len(open_)
-        while open_ and run.fire_one(open_):
+        while open_ and run.fire_one(open_, may > 0):
+            for t in open_ & run.fired:
+                may -= graph.may_fire(t)
             open_ -= run.fired
         if len(open_) == before:
             missing = graph.net.transitions[min(open_)].name
@@ -125,15 +130,11 @@ class _Run:
         self.at = found[1]
         return True
 
-    def fire_one(self, open_: set[int]) -> bool:
+    def fire_one(self, open_: set[int], may: Any) -> bool:
         """Go on to the nearest marking in which an open transition may fire, and fire it; whether there is one."""
-        graph = self.graph
-        may = np.zeros(graph.n_markings, dtype=np.bool_)
-        for t in open_:
-            may |= graph.may_fire(t)
         if not self.go(may):
             return False
-        self.fire_into(open_, np.ones(graph.n_markings, dtype=np.bool_))
+        self.fire_into(open_, np.ones(self.graph.n_markings, dtype=np.bool_))
         return True
 
     def fire_into(self, among: set[int], targets: Any) -> tuple[int, ...]:
