@@ -23,13 +23,14 @@ from firable.analysis.evidence.certificate import (
     Unfolded,
 )
 from firable.analysis.evidence.checking.checker import check_document, check_evidence
-from firable.analysis.evidence.checking.obligation import Evidence
-from firable.analysis.evidence.checking.obligations import obligations, played
+from firable.analysis.evidence.checking.obligation import Evidence, TimedTerms
+from firable.analysis.evidence.checking.obligations import diagram_term, obligations, played
 from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.analysis.evidence.document import Document, Record, document_from_text, seal
 from firable.analysis.evidence.meaning import suffices
 from firable.analysis.evidence.producing import spaces as producing
 from firable.analysis.evidence.producing.claims import Certifier
+from firable.analysis.evidence.producing.labels import drawn
 from firable.analysis.evidence.producing.lacking import LackingError
 from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.evidence.producing.room import Room
@@ -37,7 +38,9 @@ from firable.analysis.evidence.producing.runs import runs_by_search, runs_on_gra
 from firable.analysis.evidence.read_off import eager_cycle
 from firable.analysis.evidence.refusal import TimeIsOverError
 from firable.analysis.goal import Limits
+from firable.analysis.induction.smt import Term
 from firable.analysis.spaces.reachability import ReachabilityGraph, explore
+from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.nets.catalogue.families import family_net
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import And, Holds
@@ -275,6 +278,22 @@ def test_each_transition_is_asked_where_it_fires_a_few_times_on_a_graph(monkeypa
     (run,) = runs_on_graph(explore(net), list(net.transition_index), None)
     assert len(run.firings) == len(net.transitions)
     assert asked <= 2 * len(net.transitions)
+
+
+def test_a_diagram_is_as_large_a_term_as_it_has_rows(monkeypatch: pytest.MonkeyPatch) -> None:
+    negations, negation = 0, TimedTerms.negation
+
+    def counted(terms: TimedTerms, term: Term) -> Term:
+        nonlocal negations
+        negations += 1
+        return negation(terms, term)
+
+    monkeypatch.setattr(TimedTerms, "negation", counted)
+    net, terms = family_net("machines-200"), TimedTerms()
+    diagram = drawn(explore_symbolically(net))
+    names = [terms.variable(place.name) for place in net.places]
+    diagram_term(terms, net, diagram, names.__getitem__)
+    assert negations <= 2 * len(diagram.rows) + len(net.places)
 
 
 def ring(n: int) -> Net:

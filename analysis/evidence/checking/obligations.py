@@ -192,6 +192,8 @@ def diagram_term(terms: Terms, net: Net, of: Diagram, holds: Valuation[Term]) ->
 
     def below(row: int, level: int) -> Term:
         """The row, as it is seen from a level: what is passed over is empty."""
+        if row == 0:
+            return terms.false  # and nothing of what is passed over, which is everything
         passed = (terms.negation(holds(places[k - 1])) for k in range(levels[row] + 1, level))
         return terms.conjunction([values[row], *passed])
 
@@ -245,10 +247,13 @@ class _Runs:
 
     def __init__(self, relation: Relation) -> None:
         self.relation = relation
+        self._names: dict[int, dict[str, str]] = {}
 
     def at(self, k: int, term: Term) -> Term:
         """A term over the marking before, of the marking after k firings."""
-        return _renamed(self.relation.terms, term, {p.name: f"{p.name}@{k}" for p in self.relation.before})
+        if k not in self._names:
+            self._names[k] = {p.name: f"{p.name}@{k}" for p in self.relation.before}
+        return _renamed(self.relation.terms, term, self._names[k])
 
     def step(self, k: int) -> Term:
         """The firing from marking k to marking k + 1."""
