@@ -163,10 +163,7 @@ class Bench:
         """Make a new driver, as after a restart."""
         self.heard = Heard()
         points = dict(self.far.points)
-        codes = {
-            name: f"{points['code']}: {i}" if "code" in points else ""
-            for i, name in enumerate(("move", "grip", "halt"), 1)
-        }
+        codes = {name: f"{points['code']}: {i}" for i, name in enumerate(("move", "grip", "halt"), 1)}
         out = f"number: {points['number']}" if "number" in points else f"command: {points['command']}"
         text = _BINDING.format(
             keys="\n    ".join(self.far.keys.split(", ")),

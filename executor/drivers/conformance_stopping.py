@@ -10,6 +10,7 @@ import threading
 from abc import abstractmethod
 from collections.abc import Callable, Coroutine
 from contextlib import AbstractAsyncContextManager
+from functools import partial
 from typing import Any
 
 from firable.executor.drivers.bench import QUICK_S, Bench, Far, bench_net, until
@@ -85,6 +86,45 @@ class StoppingConformance:
             assert len(b.machine.orders) == 1
 
         self.bench(test)
+
+    def test_nothing_more_of_a_command_is_sent_after_a_stop(self) -> None:
+        """What a command needs goes before its number: one that a stop has overtaken in between moves nothing."""
+
+        async def test(b: Bench, turns: int) -> None:
+            async with b.connected():
+                b.driver.send(b.place("halt"), 1)
+                await until(lambda: b.heard.takings == [("M.halt", 1)], "what has to be learnt for a write is known")
+                b.machine.events.clear()
+                b.far.end.faults.delay_s = 0.003  # of each step: none but the first is sent before the stop
+                b.driver.send(b.place("move"), 1)
+                for _ in range(turns):
+                    await asyncio.sleep(0)
+                b.driver.stop()
+                await until(b.driver.devices["D"].kept.stopped.is_set, "the stop is over")
+            assert not {"number", "command"} & {*b.machine.events}
+            assert len(b.machine.orders) == 1
+            assert b.machine.events[-1] == "output"
+            assert b.heard.takings == [("M.halt", 1)]
+
+        for turns in range(4):
+            self.bench(partial(test, turns=turns), timeout_s=QUICK_S)
+
+    def test_safe_outputs_are_the_last_thing_also_behind_a_command_that_the_line_has_held(self) -> None:
+        """What was sent and not confirmed may come late, by a connection that nobody has any more."""
+
+        async def test(b: Bench) -> None:
+            async with b.connected():
+                b.far.end.faults.silent = True
+                b.driver.send(b.place("halt"), 1)
+                await until(lambda: b.driver.devices["D"].kept.writing, "the command is on its way")
+                b.driver.stop()
+                await until(lambda: b.driver.devices["D"].kept.writing is None, "it is broken off")
+                b.far.end.faults.silent = False
+                await until(b.driver.devices["D"].kept.stopped.is_set, "the stop is over")
+            assert b.machine.events[-1] == "output"
+            assert b.driver.unconfirmed == ()
+
+        self.bench(test, timeout_s=QUICK_S)
 
     def test_a_driver_that_is_cancelled_drives_the_safe_outputs_on_its_way_out(self) -> None:
         """However a run ends, its machines are stopped."""

@@ -12,8 +12,12 @@ mistakes are, into every one of them.
 
 from __future__ import annotations
 
+import asyncio
 import logging
+import socket
+import struct
 from collections.abc import Collection, Coroutine, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -33,13 +37,20 @@ DIGITS_MAX: Final = 20
 Writes = Sequence[tuple[Point, Value]]
 """Values for points; a device takes them in this order."""
 
+DROPPING: Final = (socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+"""An option of a socket: what it has not delivered is dropped when it is closed, also by the death of its process.
+
+Otherwise the kernel goes on sending for minutes. A command that was on a line that was cut would come to its machine
+when the line is back, behind the safe outputs, which went over a new connection.
+"""
+
 
 class LinkError(Exception):
     """A connection cannot be made, has failed, has timed out, or brought what nobody can read."""
 
 
 class WithheldError(LinkError):
-    """What was to be written was withheld (`Prompt.withhold`); the connection is as good as before."""
+    """What was to be written was withheld (`Withholding`); the connection is as good as before."""
 
 
 class Beside(str):
@@ -114,17 +125,17 @@ class Connection(Protocol):
         ...
 
     async def close(self) -> None:
-        """End the connection, also one that has failed; it does not fail itself."""
+        """End the connection, also one that has failed; it does not fail itself.
+
+        Nothing of what was written leaves any more, as far as that can be (`DROPPING`), and no goodbye is waited for
+        behind what was not confirmed.
+        """
         ...
 
 
 @runtime_checkable
-class Prompt(Connection, Protocol):
-    """A connection that writes at once where it can, in the very turn of the event loop in which a command comes."""
-
-    def begin(self, writes: Writes) -> Coroutine[Any, Any, None]:
-        """Begin what `write` does, and return what waits for the end of it, and fails where it does."""
-        ...
+class Withholding(Connection, Protocol):
+    """A connection that knows what of a write it has not sent; a stop breaks off a write of any other one."""
 
     def withhold(self) -> None:
         """Send nothing more of what is being written: who waits for it comes to know by `WithheldError`.
@@ -132,6 +143,43 @@ class Prompt(Connection, Protocol):
         What was sent is sent, and its end is waited for as ever; what is written from now on is sent.
         """
         ...
+
+
+@runtime_checkable
+class Prompt(Withholding, Protocol):
+    """A connection that writes at once where it can, in the very turn of the event loop in which a command comes."""
+
+    def begin(self, writes: Writes) -> Coroutine[Any, Any, None]:
+        """Begin what `write` does, and return what waits for the end of it, and fails where it does."""
+        ...
+
+
+class Stepwise:
+    """What a connection has that writes in steps, and waits for the confirmation of each (`Withholding`)."""
+
+    withheld = 0
+    """How often what was being written was withheld."""
+    is_in_doubt = False
+    """Whether something was sent and not confirmed: whatever is said behind it may wait for ever."""
+
+    def withhold(self) -> None:
+        """Let no further step of what is being written begin."""
+        self.withheld += 1
+
+    @contextmanager
+    def step(self, what: str, withheld: int) -> Iterator[None]:
+        """Around one step of a write, which began when so often something had been withheld."""
+        if withheld != self.withheld:
+            raise WithheldError(f"{what} is not written any more")
+        self.is_in_doubt = True
+        yield
+        self.is_in_doubt = False
+
+
+def drop_at_close(transport: asyncio.BaseTransport | None) -> None:
+    """Let nothing that a transport has not delivered leave when it is closed, where it is one of a network."""
+    if transport is not None and (found := transport.get_extra_info("socket")) is not None:
+        found.setsockopt(*DROPPING)
 
 
 class DeviceKind(Protocol):

@@ -9,9 +9,11 @@ that doubles up to a bound, and is read before it is written, because what the d
 to be sent.
 
 A stop breaks off what is being written, if it is not confirmed at once, and makes new connections until the device has
-confirmed the safe outputs, or has had its time. What has not been sent by then is not sent any more, where the
-connection can tell (`device.Prompt`): a command may wait behind the very question whose answer is the reason of the
-stop.
+confirmed the safe outputs, or has had its time. What has not been sent by then is not sent any more: a command may wait
+behind the very question whose answer is the reason of the stop, or be sent in steps. A connection that cannot tell what
+it has sent (`device.Withholding`) is broken off at once. And where a command was sent that was never confirmed, the
+safe outputs are written once more when the time of its answer is over: what an earlier connection still brings must not
+be the last thing that a device gets.
 
 An error that is no failure of a link is a mistake, in a library or in what is served here. It ends the run, and this
 device is stopped as any other: over a new connection of which nothing is taken, since what it shows may be what nobody
@@ -28,6 +30,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Collection, Coroutine, Sequence
 from contextlib import suppress
+from math import inf
 from typing import Any, Final, Protocol
 
 from firable.executor.drivers.binding import DeviceDocument, writes
@@ -41,6 +44,7 @@ from firable.executor.drivers.device import (
     Value,
     Wanted,
     WithheldError,
+    Withholding,
     Writes,
 )
 
@@ -171,7 +175,9 @@ class Kept:
         self.safe = writes(document.safe)
         self.awake = asyncio.Event()
         self.prompt: Prompt | None = None
-        """The connection, where it can begin a write and withhold it."""
+        """The connection, where it can begin a write."""
+        self.withholding: Withholding | None = None
+        """The connection, where it can withhold what it has not sent."""
         self.idle: Prompt | None = None
         """The same, while who writes has nothing to write."""
         self.begun: Coroutine[Any, Any, None] | None = None
@@ -188,6 +194,8 @@ class Kept:
         """What ended the serving, and was no failure of a link."""
         self.writing: asyncio.Timeout | None = None
         """Around a command that is being written: a stop breaks it off."""
+        self.late_seconds = -inf
+        """Until when a command may come to the device that was sent and never confirmed."""
         self.stopped = asyncio.Event()
         """The safe outputs have been written for the last time, or cannot be."""
         self.beat = 0
@@ -252,9 +260,10 @@ class Kept:
         """Write the safe outputs and nothing afterwards."""
         self.stopping = True
         if self.writing is not None and not self.writing.expired():
-            self.writing.reschedule(asyncio.get_running_loop().time() + _CONFIRMED_SECONDS)
-        if self.prompt is not None and (self.writing is not None or self.begun is not None):
-            self.prompt.withhold()
+            patience_s = 0.0 if self.withholding is None else _CONFIRMED_SECONDS
+            self.writing.reschedule(asyncio.get_running_loop().time() + patience_s)
+        if self.withholding is not None and (self.writing is not None or self.begun is not None):
+            self.withholding.withhold()
         self.awake.set()
 
     def urge(self) -> None:
@@ -325,6 +334,7 @@ class Kept:
         self.served.ready()
         loop = asyncio.get_running_loop()
         self.prompt = connection if isinstance(connection, Prompt) else None
+        self.withholding = connection if isinstance(connection, Withholding) else None
         heartbeat = self.document.heartbeat
         due = loop.time()
         beaten = False
@@ -343,7 +353,7 @@ class Kept:
                     self.served.written()
             elif is_due and heartbeat is not None:
                 beaten, due = True, loop.time() + heartbeat.every_s
-                await self._put(connection.write(((heartbeat.write, self.beat),)))
+                await self._put(connection.write(((heartbeat.write, self.beat),)), moves=False)
                 self.beat = (self.beat + 1) % BEATS
             else:
                 timer = None if heartbeat is None else loop.call_later(due - loop.time(), self.awake.set)
@@ -357,8 +367,11 @@ class Kept:
         if self.safe:
             await connection.write(self.safe)
         self.is_safe = True
+        if self.safe and (late_s := self.late_seconds - loop.time()) > 0:
+            await asyncio.sleep(late_s)
+            await connection.write(self.safe)
 
-    async def _put(self, writing: Coroutine[Any, Any, None]) -> bool:
+    async def _put(self, writing: Coroutine[Any, Any, None], *, moves: bool = True) -> bool:
         """Write, and break it off at a stop, so that no machine starts after it; the connection is of no use then.
 
         Returns whether it is written: what was not sent before the stop is withheld, and costs no connection.
@@ -371,19 +384,26 @@ class Kept:
             return True
         except WithheldError:
             return False
-        except TimeoutError:
-            if self.stopping:
+        except BaseException as error:
+            if moves:
+                self._doubt()
+            if isinstance(error, TimeoutError) and self.stopping:
                 raise LinkError("stopped while something was written") from None
             raise
         finally:
             self.writing = None
 
+    def _doubt(self) -> None:
+        """A command was sent of which nobody knows whether it has come, or will."""
+        self.late_seconds = asyncio.get_running_loop().time() + self.document.timeout_s
+
     def _forget(self) -> None:
         """The connection is gone, with what was begun on it."""
-        self.prompt = None
+        self.prompt = self.withholding = None
         if self.begun is not None:
             self.begun.close()
             self.begun = None
+            self._doubt()
 
     async def _watch(self) -> None:
         """End the connection when the device has not changed its sign of life in time."""

@@ -33,11 +33,12 @@ from firable.executor.drivers.device import (
     LinkError,
     Options,
     Point,
+    Stepwise,
     Use,
     Value,
     Wanted,
-    WithheldError,
     Writes,
+    drop_at_close,
     quiet,
 )
 from firable.executor.drivers.modbus_points import (
@@ -114,7 +115,7 @@ class _Question:
     what: str
 
 
-class ModbusConnection:
+class ModbusConnection(Stepwise):
     """A connection to one device, by a client that is connected."""
 
     def __init__(
@@ -139,8 +140,6 @@ class ModbusConnection:
         self.is_free = asyncio.Event()
         """Set while nothing is being written."""
         self.is_free.set()
-        self.withheld = 0
-        """How often what was being written was withheld."""
         self.points: dict[Address, list[Point]] = {}
         self.polls: list[tuple[_Question, Block]] = []
         self.layout: list[tuple[Point, int, Address]] = []
@@ -201,10 +200,6 @@ class ModbusConnection:
                 questions = self._questions(writes)  # who waits is told
         return self._written(begun, questions, self.withheld)
 
-    def withhold(self) -> None:
-        """Send nothing more of what is being written, also what waits for its turn behind a poll."""
-        self.withheld += 1
-
     def ask(self, question: _Question) -> asyncio.Future[ModbusPDU]:
         """Ask the device now, as nothing else is asked; what will be answered, or why nothing will be."""
         line = self.client.ctx
@@ -224,6 +219,8 @@ class ModbusConnection:
     async def close(self) -> None:
         """Close the client, which is not used again."""
         self.watch.close()
+        if isinstance(transport := self.client.ctx.transport, asyncio.Transport):
+            transport.abort()  # before pymodbus, which would send what it still has
         self.client.close()
 
     def _told(self, is_connected: bool) -> None:
@@ -245,12 +242,11 @@ class ModbusConnection:
                 await self._answer(answer, question)
             for question in questions:
                 await self._turn()
-                if withheld != self.withheld:
-                    self._hand_on()
-                    raise WithheldError(f"{question.what} is not written any more")
-                await self._answer(self.ask(question), question)
+                with self.step(question.what, withheld):
+                    await self._answer(self.ask(question), question)
         finally:
             self.is_free.set()
+            self._hand_on()
 
     @property
     def _is_idle(self) -> bool:
@@ -403,6 +399,7 @@ async def _opened(
         raise
     setattr(client.ctx.comm_params, "timeout_connect", None)  # noqa: B010 - its type says that there is one always
     connection = ModbusConnection(client, unit, every_s, wanted.timeout_s)
+    drop_at_close(client.ctx.transport)
     connection.want(list(wanted.read))
     return connection
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
+import socket
 import uuid
 from collections.abc import Sequence
 from contextlib import suppress
@@ -23,11 +24,13 @@ from typing import TYPE_CHECKING, Final
 from pydantic import BaseModel, ConfigDict, Field
 
 from firable.executor.drivers.device import (
+    DROPPING,
     Connection,
     File,
     LinkError,
     Options,
     Point,
+    Stepwise,
     Use,
     Value,
     Wanted,
@@ -58,7 +61,7 @@ class MqttOptions(Options):
     tls: bool | MqttTls = False
 
 
-class MqttConnection:
+class MqttConnection(Stepwise):
     """A connection to a broker."""
 
     def __init__(self, client: Client, wanted: Wanted) -> None:
@@ -96,17 +99,31 @@ class MqttConnection:
         """Publish values in their order, each when the broker has the one before."""
         from aiomqtt import MqttError
 
+        withheld = self.withheld
         for topic, value in writes:
             payload = str(int(value)) if isinstance(value, bool) else str(value)
             try:
-                await self.client.publish(topic, payload, qos=1, timeout=self.wanted.timeout_s)
+                with self.step(f"'{topic}'", withheld):
+                    await self.client.publish(topic, payload, qos=1, timeout=self.wanted.timeout_s)
             except MqttError as error:
                 raise LinkError(f"'{topic}': {error}") from None
 
     async def close(self) -> None:
-        """Say goodbye if that can be."""
-        with suppress(Exception):
-            await asyncio.wait_for(self.client.__aexit__(None, None, None), self.wanted.timeout_s)
+        """Say goodbye if that can be, and end the connection in any case."""
+        from aiomqtt import MqttError
+
+        try:
+            if not self.is_in_doubt:
+                with suppress(Exception):
+                    await asyncio.wait_for(self.client.__aexit__(None, None, None), self.wanted.timeout_s)
+        finally:
+            # There is no other way: aiomqtt ends a connection by a goodbye alone, which it sends behind all else.
+            if isinstance(found := self.client._client.socket(), socket.socket):
+                with suppress(OSError):
+                    found.shutdown(socket.SHUT_RDWR)
+                with suppress(MqttError):  # when it has seen that
+                    while await anext(self.client.messages):
+                        pass
 
 
 class Mqtt:
@@ -142,6 +159,7 @@ class Mqtt:
             timeout=wanted.timeout_s,
             keepalive=max(1, math.ceil(wanted.timeout_s)),
             tls_params=tls,
+            socket_options=[DROPPING],
         )
         connection = MqttConnection(client, wanted)
         try:

@@ -26,10 +26,12 @@ from firable.executor.drivers.device import (
     LinkError,
     Options,
     Point,
+    Stepwise,
     Use,
     Value,
     Wanted,
     Writes,
+    drop_at_close,
     quiet,
 )
 
@@ -70,7 +72,7 @@ class OpcUaOptions(Options):
     security: OpcUaSecurity | None = None
 
 
-class OpcUaConnection:
+class OpcUaConnection(Stepwise):
     """A session with a server, and a subscription to the nodes that are read."""
 
     def __init__(self, client: Client, wanted: Wanted) -> None:
@@ -87,6 +89,7 @@ class OpcUaConnection:
 
         self.client.connection_lost_callback = self._lost
         await self.client.connect()
+        drop_at_close(self._transport)
         nodes = [self.client.get_node(point) for point in self.wanted.read]
         self.points = {node.nodeid.to_string(): point for node, point in zip(nodes, self.wanted.read, strict=True)}
         subscription = await self.client.create_subscription(1000 * every_s, self)
@@ -114,16 +117,21 @@ class OpcUaConnection:
 
     async def write(self, writes: Writes) -> None:
         """Write values, the last one when the others are confirmed."""
+        withheld = self.withheld
         for some in (writes[:-1], writes[-1:]):
             if some:
-                await self._write(some)
+                await self._write(some, withheld)
 
     async def close(self) -> None:
         """End the session if that can be, and the connection in any case."""
+        transport = self._transport
         try:
-            with suppress(Exception):
-                await asyncio.wait_for(self.client.disconnect(), self.wanted.timeout_s)
+            if not self.is_in_doubt:
+                with suppress(Exception):
+                    await asyncio.wait_for(self.client.disconnect(), self.wanted.timeout_s)
         finally:
+            if transport is not None:
+                transport.abort()  # before asyncua, which would send what it still has
             self.client.disconnect_socket()
 
     def datachange_notification(self, node: Node, value: Any, data: Any) -> None:
@@ -143,19 +151,26 @@ class OpcUaConnection:
     async def _lost(self, error: Exception) -> None:
         self.told.put_nowait(error)
 
-    async def _write(self, writes: Writes) -> None:
+    @property
+    def _transport(self) -> asyncio.Transport | None:
+        protocol = self.client.uaclient.protocol
+        return None if protocol is None else protocol.transport
+
+    async def _write(self, writes: Writes, withheld: int) -> None:
         from asyncua import ua
         from asyncua.ua.uaerrors import UaError
 
         nodes = [self.client.get_node(point) for point, _ in writes]
         for (point, _), node in zip(writes, nodes, strict=True):
             if point not in self.types:
-                self.types[point] = await node.read_data_type_as_variant_type()
+                with self.step(f"'{point}'", withheld):
+                    self.types[point] = await node.read_data_type_as_variant_type()
         try:
             values = [
                 ua.DataValue(ua.Variant(_typed(value, self.types[point]), self.types[point])) for point, value in writes
             ]
-            await self.client.write_values(nodes, values)
+            with self.step(f"'{writes[0][0]}'", withheld):
+                await self.client.write_values(nodes, values)
         except UaError as error:
             raise LinkError(f"the server does not let '{writes[0][0]}' be written: {error}") from None
         except (ValueError, TypeError) as error:

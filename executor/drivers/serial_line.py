@@ -23,7 +23,17 @@ from typing import TYPE_CHECKING, Final
 
 from pydantic import Field
 
-from firable.executor.drivers.device import Connection, LinkError, Options, Point, Use, Value, Wanted, Writes
+from firable.executor.drivers.device import (
+    Connection,
+    LinkError,
+    Options,
+    Point,
+    Stepwise,
+    Use,
+    Value,
+    Wanted,
+    Writes,
+)
 
 if TYPE_CHECKING:
     from serial import Serial
@@ -137,7 +147,7 @@ class Lines:
         self.come.set()
 
 
-class SerialConnection:
+class SerialConnection(Stepwise):
     """A line with a device at its other end."""
 
     def __init__(self, lines: Lines, wanted: Wanted, every_s: float) -> None:
@@ -162,12 +172,14 @@ class SerialConnection:
 
     async def write(self, writes: Writes) -> None:
         """Write values in their order, each when the device has confirmed the one before."""
+        withheld = self.withheld
         for point, value in writes:
             line = f"{point}={int(value) if isinstance(value, bool) else value}"
             confirmed = self.unconfirmed[line] = asyncio.get_running_loop().create_future()
-            self.lines.put(line)
             try:
-                await asyncio.wait_for(confirmed, self.timeout_s)
+                with self.step(f"'{line}'", withheld):
+                    self.lines.put(line)
+                    await asyncio.wait_for(confirmed, self.timeout_s)
             except TimeoutError:
                 raise LinkError(f"'{line}' is not confirmed within {self.timeout_s:g} s") from None
             finally:

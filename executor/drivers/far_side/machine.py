@@ -15,8 +15,8 @@ from typing import Final
 from firable.executor.drivers.device import Point, Value, as_number
 from firable.executor.drivers.far_side.end import FarEnd
 
-ROLES: Final = ("sensor", "closed", "button", "beat", "tripped", "output", "taken", "done", "failed")
-"""What an end must have a point for; besides `number` and `code`, or `command`."""
+ROLES: Final = ("sensor", "closed", "button", "beat", "tripped", "output", "code", "taken", "done", "failed")
+"""What an end must have a point for; besides `number` or `command`."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,6 +33,8 @@ class ModbusServer:
         self.faults = Faults()
         self.shown: dict[tuple[str, int], int] = {}
         self.written: Callable[[Point, Value], None] = lambda _point, _value: None
+        self.turn = asyncio.Lock()
+        """A device does one thing after the other, where pymodbus would do them all at a time."""
 
     def show(self, point: Point, value: Value) -> None:
         """Show a value to whoever reads it."""
@@ -63,10 +65,11 @@ class ModbusServer:
         registers: list[int],
         values: list[int] | list[bool] | None,
     ) -> ExcCodes | None:
-        if self.faults.delay_s:
-            await asyncio.sleep(self.faults.delay_s)
-        while self.faults.silent:
-            await asyncio.sleep(0.01)
+        async with self.turn:
+            if self.faults.delay_s:
+                await asyncio.sleep(self.faults.delay_s)
+            while self.faults.silent:
+                await asyncio.sleep(0.01)
         table = _TABLES[function]
         for offset, value in enumerate(values or ()):
             self.shown[table, first + offset] = int(value)

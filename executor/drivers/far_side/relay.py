@@ -1,13 +1,15 @@
 """A relay in a network line, which can be cut, hold what goes through it, delay it or garble it.
 
 It stands before servers whose own misbehaviour cannot be asked for. What it holds while it is silent goes on when it is
-not any more, as the answers of a slow network do: late, and on the old connection.
+not any more, as the answers of a slow network do: late, and on the old connection. It can hold what goes to the server
+by one connection, while others pass.
 """
 
 from __future__ import annotations
 
 import asyncio
 from contextlib import suppress
+from typing import Any
 
 from firable.executor.drivers.far_side.end import Faults
 
@@ -22,6 +24,10 @@ class Relay:
         self.target = 0
         self.server: asyncio.Server | None = None
         self.carrying: set[asyncio.Task[None]] = set()
+        self.held: set[asyncio.Task[None]] = set()
+        """Those of which nothing comes to the server."""
+        self.mark = b""
+        """What is not to come there, while it is anything."""
 
     async def open(self, target: int) -> None:
         """Lead to a port of this host."""
@@ -39,6 +45,15 @@ class Relay:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
+    def hold(self, mark: bytes) -> None:
+        """Hold what has these bytes, and all that its connection brings behind it, until `release`."""
+        self.mark = mark
+
+    def release(self) -> None:
+        """Let it come to the server, also where its connection is gone."""
+        self.mark = b""
+        self.held.clear()
+
     def _accepted(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         task = asyncio.get_running_loop().create_task(self._carried(reader, writer))
         self.carrying.add(task)
@@ -48,8 +63,8 @@ class Relay:
         far_writer: asyncio.StreamWriter | None = None
         try:
             far_reader, far_writer = await asyncio.open_connection("127.0.0.1", self.target)
-            there = self._carry(reader, far_writer, garbles=False)
-            await asyncio.gather(there, self._carry(far_reader, writer, garbles=self.garbles))
+            there = self._carry(reader, far_writer, asyncio.current_task())
+            await asyncio.gather(there, self._carry(far_reader, writer))
         except OSError:
             pass  # the end behind it takes no connection, or has dropped it: so does the relay
         finally:
@@ -57,14 +72,18 @@ class Relay:
                 if one is not None:
                     one.transport.abort()
 
-    async def _carry(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, *, garbles: bool) -> None:
+    async def _carry(
+        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, there: asyncio.Task[Any] | None = None
+    ) -> None:
         with suppress(OSError):
             while some := await reader.read(65_536):
+                if there is not None and self.mark and self.mark in some:
+                    self.held.add(there)
                 if self.faults.delay_s:
                     await asyncio.sleep(self.faults.delay_s)
-                while self.faults.silent:
+                while self.faults.silent or there in self.held:
                     await asyncio.sleep(0.01)
-                if garbles and self.faults.garbage:
+                if there is None and self.garbles and self.faults.garbage:
                     some = bytes(byte ^ 0x5A for byte in some)
                 writer.write(some)
                 await writer.drain()

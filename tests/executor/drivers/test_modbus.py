@@ -24,7 +24,7 @@ POINTS = {
     "output": "coil 3",
     "beat": "holding 0",
     "code": "holding 10",
-    "number": "holding 11",
+    "number": "holding 12",
     "taken": "input 10",
     "done": "input 11",
     "failed": "input 12",

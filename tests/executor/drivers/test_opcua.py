@@ -12,7 +12,7 @@ from firable.executor.drivers.conformance import DriverConformance
 from firable.executor.drivers.far_side.machine import ROLES
 from firable.executor.drivers.far_side.opcua_server import OpcUaEnd
 
-POINTS = {role: f"ns=2;s=M.{role}" for role in (*ROLES, "number", "code")}
+POINTS = {role: f"ns=2;s=M.{role}" for role in (*ROLES, "number")}
 BITS = {"sensor", "closed", "button", "tripped", "output"}
 
 

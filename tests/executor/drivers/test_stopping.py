@@ -13,7 +13,7 @@ from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.bound import BoundDriver
 from firable.executor.drivers.device import Point, Value, Writes
 
-BINDING = """{firable_bind: 1, cell: c, devices: {D: {driver: theirs, memory: stopping, timeout_s: 5, retry_s: 0.02,
+BINDING = """{firable_bind: 1, cell: c, devices: {D: {driver: theirs, memory: stopping, timeout_s: 1, retry_s: 0.02,
 safe: {output: false}}}}"""
 
 
@@ -49,7 +49,8 @@ def test_safe_outputs_are_driven_and_nothing_after_them(when: str, monkeypatch: 
         await asyncio.wait((task,), timeout=PATIENCE_S)
 
     asyncio.run(main())
-    assert written == ["output"]
+    # Where something was sent that may come late, once more behind it.
+    assert written == ["output"] * (2 if when == "write in flight" else 1)
 
 
 TWO = """{firable_bind: 1, cell: c, devices: {D: {driver: theirs, memory: gone, timeout_s: 0.1, retry_s: 0.02,
@@ -138,7 +139,7 @@ def test_a_mistake_of_a_library_stops_its_device_as_any_other_and_is_a_fault(
         ends = [MemoryEnd("gone"), MemoryEnd("there")]
         await ends[0].start(lambda point, _: written.append(f"D {point}"))
         await ends[1].start(lambda point, _: written.append(f"E {point}"))
-        driver = BoundDriver(parse_binding(TWO.replace("timeout_s: 0.1", "timeout_s: 5")), (), frozenset())
+        driver = BoundDriver(parse_binding(TWO.replace("timeout_s: 0.1", "timeout_s: 1")), (), frozenset())
         task = asyncio.create_task(driver.run(heard, heard))
         await until(lambda: len(written) == 2, "the safe outputs of the start")
         written.clear()
@@ -161,5 +162,5 @@ def test_a_mistake_of_a_library_stops_its_device_as_any_other_and_is_a_fault(
         assert all(device.kept.is_safe for device in driver.devices.values())
 
     asyncio.run(main())
-    assert sorted(written) == ["D output", "E output"]
+    assert sorted(written) == ["D output"] * (2 if at == "write" else 1) + ["E output"]
     assert [fault.split(",")[0] for fault in heard.faults] == ["D: its driver has failed"] * (at != "stopped")

@@ -27,7 +27,7 @@ def installed(monkeypatch: pytest.MonkeyPatch) -> None:
 class TestNumbers(DriverConformance):
     @asynccontextmanager
     async def far_end(self) -> AsyncIterator[Far]:
-        points = {role: f"the {role}" for role in (*ROLES, "number", "code")}
+        points = {role: f"the {role}" for role in (*ROLES, "number")}
         yield Far(MemoryEnd("m"), "driver: theirs, memory: m", points)
 
 
