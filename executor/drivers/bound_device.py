@@ -70,7 +70,8 @@ class BoundDevice:
         self.garbage: dict[Point, Value] = {}
         points = {*self.image.reads, *self.image.counters, *self.replies}
         points |= {point for point in (self.tripped, None if alive is None else alive.read) if point is not None}
-        self.kept = Kept(self.document, binding.kinds[name], binding.options[name], frozenset(points), self)
+        urgent = frozenset(one.read for one in contacts.values())
+        self.kept = Kept(self.document, binding.kinds[name], binding.options[name], frozenset(points), self, urgent)
 
     async def run(self) -> None:
         """Keep the device connected."""

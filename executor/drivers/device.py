@@ -100,10 +100,14 @@ class Use(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What a connection is for: the points to be read, and how long an answer may take."""
+    """What a connection is for: the points to be read, and how long an answer may take.
+
+    Those that are `urgent`, the contacts of the emergency stop, are told as soon as they are known.
+    """
 
     read: Collection[Point]
     timeout_s: float
+    urgent: Collection[Point] = ()
 
 
 class Connection(Protocol):
@@ -116,7 +120,7 @@ class Connection(Protocol):
         """Wait until there is something, and return all that has come, in its order.
 
         The first answer is what the device shows now, as far as it tells that by itself. A device that is polled
-        answers each time with all of its points.
+        answers each time with all of its points; in between it may tell of those that are urgent.
         """
         ...
 

@@ -165,12 +165,18 @@ class Kept:
     """A device that is kept connected until it is stopped."""
 
     def __init__(
-        self, document: DeviceDocument, kind: DeviceKind, options: Options, points: frozenset[Point], served: Served
+        self,
+        document: DeviceDocument,
+        kind: DeviceKind,
+        options: Options,
+        points: frozenset[Point],
+        served: Served,
+        urgent: frozenset[Point] = frozenset(),
     ) -> None:
         self.document = document
         self.kind = kind
         self.options = options
-        self.wanted = Wanted(tuple(sorted(points)), document.timeout_s)
+        self.wanted = Wanted(tuple(sorted(points)), document.timeout_s, urgent)
         self.served = served
         self.safe = writes(document.safe)
         self.awake = asyncio.Event()

@@ -58,6 +58,10 @@ class Block:
     first: int
     count: int
 
+    def has(self, one: Address) -> bool:
+        """Whether an address is in it."""
+        return one.table == self.table and self.first <= one.number < self.first + self.count
+
 
 def blocks(addresses: Sequence[Address]) -> Iterator[Block]:
     """The requests that read all addresses and nothing else.

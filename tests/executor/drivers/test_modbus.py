@@ -4,17 +4,19 @@ import asyncio
 import os
 import pty
 import tty
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
 from functools import partial
 
 import pytest
+from pymodbus.framer import FramerRTU
 
 from firable.executor.drivers import modbus
 from firable.executor.drivers.bench import PATIENCE_S, Far, until
 from firable.executor.drivers.conformance import DriverConformance
-from firable.executor.drivers.device import Connection, LinkError, Wanted
+from firable.executor.drivers.device import Connection, LinkError, Point, Value, Wanted
 from firable.executor.drivers.far_side.modbus_server import ModbusRtuEnd, ModbusTcpEnd
+from firable.executor.drivers.modbus_connection import ModbusConnection
 
 POINTS = {
     "sensor": "discrete 0",
@@ -132,7 +134,7 @@ def test_an_answer_to_a_question_that_was_broken_off_is_nobodys_and_nothing_is_s
         server = await asyncio.start_server(serve, "127.0.0.1", 0)
         options = modbus.TcpOptions(host="127.0.0.1", port=server.sockets[0].getsockname()[1], every_s=0)
         connection = await modbus.TCP.connect(options, WANTED)
-        assert isinstance(connection, modbus.ModbusConnection)
+        assert isinstance(connection, ModbusConnection)
         for number in range(2):
             reading = asyncio.create_task(connection.read())
             await asked(number + 1)
@@ -147,3 +149,45 @@ def test_an_answer_to_a_question_that_was_broken_off_is_nobodys_and_nothing_is_s
 
     asyncio.run(main())
     assert not [record for record in caplog.records if record.name.startswith("pymodbus")]
+
+
+@pytest.mark.parametrize("is_cancelled", [False, True])
+def test_serial_line_is_not_left_before_the_answer_that_is_still_owed_which_is_nobodys(is_cancelled: bool) -> None:
+    async def main() -> None:
+        far, near = pty.openpty()
+        tty.setraw(near)
+        loop = asyncio.get_running_loop()
+        questions: list[bytes] = []
+        loop.add_reader(far, lambda: questions.append(os.read(far, 256)))
+
+        def answer(value: int) -> None:
+            body = bytes.fromhex("01 04 02") + value.to_bytes(2, "big")
+            os.write(far, body + FramerRTU.compute_CRC(body).to_bytes(2, "big"))
+
+        async def asked(count: int) -> tuple[Connection, asyncio.Task[Sequence[tuple[Point, Value]]]]:
+            connection = await modbus.RTU.connect(options, WANTED)
+            reading = asyncio.create_task(connection.read())
+            await until(lambda: len(questions) == count, "the question")
+            return connection, reading
+
+        options = modbus.RtuOptions(port=os.ttyname(near), parity="N", every_s=0)
+        connection, reading = await asked(1)
+        reading.cancel()
+        closing = asyncio.create_task(connection.close())
+        done, _ = await asyncio.wait((closing,), timeout=0.05)
+        assert not done
+        if is_cancelled:  # it is left at once then
+            closing.cancel()
+            await asyncio.wait((closing,))
+        else:
+            answer(7)
+            await asyncio.wait_for(closing, PATIENCE_S)
+        connection, reading = await asked(2)
+        answer(8)
+        assert list(await asyncio.wait_for(reading, PATIENCE_S)) == [("input 0", 8)]
+        await asyncio.wait_for(connection.close(), PATIENCE_S)
+        loop.remove_reader(far)
+        os.close(far)
+        os.close(near)
+
+    asyncio.run(main())

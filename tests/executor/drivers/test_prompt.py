@@ -26,6 +26,7 @@ from firable.executor.drivers.device import (
 )
 from firable.executor.drivers.far_side.modbus_server import ModbusTcpEnd
 from firable.executor.drivers.keeping import Kept, Nobody
+from firable.executor.drivers.modbus_connection import ModbusConnection
 
 BINDING = """{firable_bind: 1, cell: c, devices: {D: {driver: modbus-tcp, host: h, timeout_s: 5, retry_s: 0.02,
 safe: {coil 1: false}}}}"""
@@ -260,7 +261,7 @@ def test_command_that_waits_for_an_answer_is_not_sent_after_a_stop(turns: int, p
         task = asyncio.create_task(kept.run())
         await until(lambda: kept.idle is not None, "the connection")
         connection = kept.idle
-        assert isinstance(connection, modbus.ModbusConnection)
+        assert isinstance(connection, ModbusConnection)
         end.faults.delay_s = 0.01
         for _ in range(2):  # the second one is answered so late
             asked = connection.watch.answer
@@ -285,7 +286,7 @@ def test_command_that_waits_for_an_answer_is_not_sent_after_a_stop(turns: int, p
 
 
 def over_modbus(
-    work: Callable[[modbus.ModbusConnection, ModbusTcpEnd, list[Point]], Awaitable[None]],
+    work: Callable[[ModbusConnection, ModbusTcpEnd, list[Point]], Awaitable[None]],
     read: Sequence[Point] = ("input 0", "input 5"),
 ) -> None:
     """Do something on a connection to a server, which notes what it is written."""
@@ -297,7 +298,7 @@ def over_modbus(
         options = modbus.TcpOptions(host="127.0.0.1", port=end.port, every_s=0)
         wanted = Wanted(read=read, timeout_s=10 * PATIENCE_S)
         connection = await modbus.TCP.connect(options, wanted)
-        assert isinstance(connection, modbus.ModbusConnection)
+        assert isinstance(connection, ModbusConnection)
         assert isinstance(connection, Prompt)
         try:
             await work(connection, end, written)
@@ -309,7 +310,7 @@ def over_modbus(
 
 
 def test_what_is_begun_is_on_its_way_before_anybody_waits_for_it() -> None:
-    async def work(connection: modbus.ModbusConnection, end: ModbusTcpEnd, written: list[Point]) -> None:
+    async def work(connection: ModbusConnection, end: ModbusTcpEnd, written: list[Point]) -> None:
         del end
         writing = connection.begin([("holding 1", 7), ("coil 3", True)])
         await until(lambda: written == ["holding 1"], "the first of it")
@@ -320,7 +321,7 @@ def test_what_is_begun_is_on_its_way_before_anybody_waits_for_it() -> None:
 
 
 def test_what_is_begun_while_something_is_polled_goes_before_the_rest_of_the_poll() -> None:
-    async def work(connection: modbus.ModbusConnection, end: ModbusTcpEnd, written: list[Point]) -> None:
+    async def work(connection: ModbusConnection, end: ModbusTcpEnd, written: list[Point]) -> None:
         end.show("input 5", 1)
         polled = asyncio.create_task(connection.read())
         while not connection.is_asking:
@@ -334,7 +335,7 @@ def test_what_is_begun_while_something_is_polled_goes_before_the_rest_of_the_pol
 
 
 def test_what_is_withheld_is_sent_no_further_and_the_line_goes_on() -> None:
-    async def work(connection: modbus.ModbusConnection, end: ModbusTcpEnd, written: list[Point]) -> None:
+    async def work(connection: ModbusConnection, end: ModbusTcpEnd, written: list[Point]) -> None:
         end.show("input 5", 1)
         begun = connection.begin([("holding 1", 7), ("coil 3", True)])
         polled = asyncio.create_task(connection.read())
@@ -350,7 +351,7 @@ def test_what_is_withheld_is_sent_no_further_and_the_line_goes_on() -> None:
 
 
 def test_device_of_which_nothing_is_read_leaves_the_loop_to_others() -> None:
-    async def work(connection: modbus.ModbusConnection, end: ModbusTcpEnd, written: list[Point]) -> None:
+    async def work(connection: ModbusConnection, end: ModbusTcpEnd, written: list[Point]) -> None:
         del end, written
         reading = connection.read()
         reading.send(None)  # it waits
@@ -361,7 +362,7 @@ def test_device_of_which_nothing_is_read_leaves_the_loop_to_others() -> None:
 
 
 def test_value_that_cannot_be_written_fails_for_who_waits_and_the_line_goes_on() -> None:
-    async def work(connection: modbus.ModbusConnection, end: ModbusTcpEnd, written: list[Point]) -> None:
+    async def work(connection: ModbusConnection, end: ModbusTcpEnd, written: list[Point]) -> None:
         del end
         writing = connection.begin([("holding 1", "x")])
         with pytest.raises(LinkError, match="holding 1 takes numbers, not 'x'"):
