@@ -11,7 +11,7 @@ import asyncio
 from collections.abc import Collection, Mapping, Sequence
 
 from firable.executor.drivers.binding import Binding, CommandDocument
-from firable.executor.drivers.bound_device import BoundDevice
+from firable.executor.drivers.bound_device import LOOK_SECONDS, BoundDevice
 from firable.executor.drivers.completions import Completions
 from firable.executor.drivers.driver import Answer, Clock, Listener, Reading
 from firable.executor.drivers.fitting import misfits
@@ -164,6 +164,12 @@ class BoundDriver:
         if stopped:
             await device.settled(channel, place.name, entry)
         answer = channel.answer(place.name, entry, stopped=stopped)
+        while answer is Answer.NOT_RECEIVED and device.may_be_late:  # sent by who was here before
+            await asyncio.sleep(LOOK_SECONDS)
+            answer = channel.answer(place.name, entry, stopped=stopped)
+        if answer is Answer.NOT_RECEIVED and device.unreached:
+            channel.expect(place.name, entry)
+            return Answer.UNKNOWN
         if answer is not Answer.DONE or place.completion is None:
             return answer
         # Done, and seen to be done: the sensor, where there is one, has its say.

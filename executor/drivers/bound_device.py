@@ -26,7 +26,8 @@ from firable.nets.net import Place
 if TYPE_CHECKING:
     from firable.executor.drivers.bound import BoundDriver
 
-_LOOK_SECONDS: Final = 0.01
+LOOK_SECONDS: Final = 0.01
+"""How often it is looked whether a device shows something of a command."""
 
 
 class BoundDevice:
@@ -65,6 +66,8 @@ class BoundDevice:
         self.writing: Channel | Handshake | None = None
         self.is_ready = asyncio.Event()
         self.was_ready = False
+        self.ready_seconds = 0.0
+        """When there was a connection first, by the event loop."""
         self.alarm: asyncio.TimerHandle | None = None
         self.noted = ""
         self.garbage: dict[Point, Value] = {}
@@ -97,7 +100,12 @@ class BoundDevice:
         with suppress(TimeoutError):
             async with asyncio.timeout(self.document.timeout_s):
                 while channel.is_at(place, entry):
-                    await asyncio.sleep(_LOOK_SECONDS)
+                    await asyncio.sleep(LOOK_SECONDS)
+
+    @property
+    def may_be_late(self) -> bool:
+        """Whether something may still come to it that was sent before its first connection here."""
+        return asyncio.get_running_loop().time() < self.ready_seconds + self.document.timeout_s
 
     def force(self, point: Point, value: bool) -> None:
         """Write a point beside all else."""
@@ -170,6 +178,8 @@ class BoundDevice:
         for channel in self.channels.values():
             if (forgotten := channel.connected_again()) is not None:
                 self._fault(f"knows nothing any more of '{forgotten.text}' of '{forgotten.place}', which it had taken")
+        if not self.was_ready:
+            self.ready_seconds = asyncio.get_running_loop().time()
         self.was_ready = True
         self.is_ready.set()
 

@@ -4,7 +4,9 @@ Every command goes out with a *number*, written behind all that it needs, and th
 *taken*, has *done* or has *failed* at. Numbers make the rest simple. An answer with another number is to another
 command, however late it comes. A device that is written the number it has already ignores it, so that a write whose
 confirmation was lost is repeated without harm. After a restart the numbers shown say what became of a command, because
-the number is computed from place and entry, which outlive the executor in its journal.
+the number is computed from place and entry, which outlive the executor in its journal. That a command has not been
+received is certain only when whatever may be on its way has had its time; should it come later still, it is sent with
+the number that the device has by then, and ignored.
 
 Where the device already shows the number that is to be sent, as it may when a run begins without a journal, it is sent
 number 0 first, "no command", and the number goes out when it is shown no more. Rejected, where a device has the choice:
@@ -92,6 +94,8 @@ class Channel:
         """Whether the newest order is not to be written again, should its connection fail before the device has it."""
         self.failed_before: int | None = None
         """The number that was shown as failed when a restart asked, as long as it is: somebody was asked what to do."""
+        self.not_received: set[int] = set()
+        """The numbers of which a restart was told that the device had not received them."""
 
     @property
     def is_writing(self) -> bool:
@@ -138,11 +142,12 @@ class Channel:
         order = self.current
         if order is None or self.phase in {_Phase.WRITING, _Phase.WRITTEN}:
             return None
-        if order.number in self.shown.values():
+        if order.number in self.shown.values() and order.number not in self.not_received:
             if self.phase is _Phase.CLEARING:
                 return None
             self.phase = _Phase.CLEARING
             return self._numbered(0, "")
+        self.not_received.discard(order.number)  # it may have come since: then the device ignores it
         self.phase = _Phase.WRITING
         self.outstanding = {number: one for number, one in self.outstanding.items() if one.place != order.place}
         self.outstanding[order.number] = self.untaken[order.number] = order
@@ -150,11 +155,13 @@ class Channel:
 
     def written(self) -> tuple[Outcome, ...]:
         """The device has confirmed what was to be written; returns what that tells, where it does not tell more."""
-        if self.phase is _Phase.WRITING:
-            self.phase = _Phase.WRITTEN
-            if self.current is not None and self.document.taken is None:
-                return self._has(self.current.number)
-        return ()
+        if self.phase is not _Phase.WRITING or (order := self.current) is None:
+            return ()
+        self.phase = _Phase.WRITTEN
+        if self.document.taken is None:
+            return self._has(order.number)
+        shown = [key for key, number in self.shown.items() if number == order.number]  # also from before it was written
+        return tuple(outcome for key in shown for outcome in self.shows(key, order.number))
 
     def shows(self, key: str, value: Value) -> tuple[Outcome, ...]:
         """The device shows a number; returns what that tells."""
@@ -224,6 +231,7 @@ class Channel:
         if taken is None or not self._came_before(taken):
             return Answer.UNKNOWN
         del self.outstanding[number], self.untaken[number]
+        self.not_received.add(number)
         return Answer.NOT_RECEIVED
 
     def _came_before(self, taken: int) -> bool:

@@ -15,7 +15,22 @@ from typing import Any
 
 from firable.executor.drivers.bench import QUICK_S, Bench, Far, bench_net, until
 from firable.executor.drivers.driver import Answer
-from firable.executor.drivers.far_side.machine import Machine
+from firable.executor.drivers.far_side.machine import Machine, Order
+
+
+class Breaking(list[Order]):
+    """The orders of a machine whose line is cut as it gets the first one."""
+
+    def __init__(self, bench: Bench) -> None:
+        super().__init__()
+        self.far = bench.far
+        self.cutting: asyncio.Task[None]
+
+    def append(self, order: Order) -> None:
+        """Get an order."""
+        super().append(order)
+        if len(self) == 1:
+            self.cutting = asyncio.ensure_future(self.far.end.cut())
 
 
 class StoppingConformance:
@@ -264,7 +279,7 @@ class StoppingConformance:
                 await until(lambda: b.heard_of("moved"), "the completion")
             assert b.heard_of("moved") == [(True, 8)]
 
-        self.bench(test, timeout_s=4 * QUICK_S)
+        self.bench(test, timeout_s=2 * QUICK_S)
 
     def test_a_machine_that_the_safe_outputs_of_the_start_have_stopped_leaves_it_to_a_person(self) -> None:
         """How far it has come is to be seen only there."""
@@ -280,7 +295,59 @@ class StoppingConformance:
                 assert await b.driver.ask(b.place("move"), 8) is Answer.NOT_RECEIVED
             assert len(b.machine.orders) == 1
 
-        self.bench(test)
+        self.bench(test, timeout_s=2 * QUICK_S)
+
+    def test_a_command_that_comes_late_is_neither_told_as_not_received_nor_given_twice(self) -> None:
+        """What stands before the machine when a restart asks is taken by it some time, and then it has it."""
+
+        async def test(b: Bench, *, is_asked_in_time: bool) -> None:
+            async with b.connected():
+                b.machine.takes = False
+                b.driver.send(b.place("move"), 7)
+                await until(lambda: {"number", "command"} & {*b.machine.events}, "the number is written")
+            b.begin()
+            async with b.connected():
+                asked = asyncio.create_task(b.driver.ask(b.place("move"), 7))
+                if is_asked_in_time:
+                    for _ in range(10):
+                        await asyncio.sleep(0)
+                    b.machine.takes = True
+                    assert await asked is Answer.WORKING
+                else:
+                    assert await asked is Answer.NOT_RECEIVED
+                    b.machine.takes = True
+                    b.machine.show("sensor", value=True)
+                    await until(lambda: b.heard_of("held")[-1:] == [(True, None)], "what comes later is read")
+                    b.driver.send(b.place("move"), 7)
+                    await until(lambda: b.heard.takings == [("M.move", 7)], "it is told as taken")
+                b.machine.finish()
+                await until(lambda: b.heard_of("moved") == [(True, 7)], "the completion")
+            assert len(b.machine.orders) == 1
+
+        self.bench(partial(test, is_asked_in_time=True), timeout_s=2 * QUICK_S)
+        self.bench(partial(test, is_asked_in_time=False), timeout_s=QUICK_S)
+
+    def test_a_command_whose_confirmation_is_lost_is_had_by_the_machine_once(self) -> None:
+        """The line breaks as the machine takes it: what it shows says so, to this run and to the next one."""
+
+        async def test(b: Bench) -> None:
+            async with b.connected():
+                b.machine.orders = orders = Breaking(b)
+                b.driver.send(b.place("move"), 7)
+                await until(lambda: orders, "the command arrives")
+                await orders.cutting
+                await until(lambda: not b.driver.devices["D"].is_ready.is_set(), "the loss")
+                await b.far.end.mend()
+                await until(lambda: b.heard.takings == [("M.move", 7)], "it is told as taken")
+                await b.far.end.cut()
+                await until(lambda: not b.driver.devices["D"].is_ready.is_set(), "the loss")
+            await b.far.end.mend()
+            b.begin()
+            async with b.connected():
+                assert await b.driver.ask(b.place("move"), 7) is Answer.WORKING
+            assert len(orders) == 1
+
+        self.bench(test, timeout_s=QUICK_S)
 
     def test_a_machine_that_cannot_be_reached_leaves_it_unknown(self) -> None:
         """An answer is not made up."""
