@@ -44,10 +44,10 @@ from measuring import Table, against
 from firable.decompose.splitting.cut import split
 from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.bound import bound_driver
+from firable.executor.drivers.cancelling import ended
 from firable.executor.drivers.device import Point, Value
 from firable.executor.drivers.driver import Answer, Clock, Driver, Listener, Reading
 from firable.executor.drivers.far_side.modbus_server import ModbusTcpEnd
-from firable.executor.drivers.keeping import ended
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.executor.protocol.controller import LocalController

@@ -12,10 +12,10 @@ from collections.abc import Collection, Mapping, Sequence
 
 from firable.executor.drivers.binding import Binding, CommandDocument
 from firable.executor.drivers.bound_device import LOOK_SECONDS, BoundDevice
+from firable.executor.drivers.cancelling import ended, uninterrupted
 from firable.executor.drivers.completions import Completions
 from firable.executor.drivers.driver import Answer, Clock, Listener, Reading
 from firable.executor.drivers.fitting import misfits
-from firable.executor.drivers.keeping import ended, uninterrupted
 from firable.executor.drivers.sharing import masters, shared
 from firable.nets.diagnostics import InputError
 from firable.nets.net import Net, Place, SignalKind

@@ -28,12 +28,13 @@ and on: until the stop is reset each connection begins with the safe outputs.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Collection, Coroutine, Sequence
+from collections.abc import Coroutine, Sequence
 from contextlib import suppress
 from math import inf
 from typing import Any, Final, Protocol
 
 from firable.executor.drivers.binding import DeviceDocument, writes
+from firable.executor.drivers.cancelling import ended
 from firable.executor.drivers.device import (
     Connection,
     DeviceKind,
@@ -51,47 +52,10 @@ from firable.executor.drivers.device import (
 BEATS: Final = 65_536
 """Heartbeats are numbers from 0, one more each time, and again from 0."""
 
-_CANCELLED_AGAIN_SECONDS: Final = 0.5
-
 _CONFIRMED_SECONDS: Final = 0.02
 """A command that the device confirms so soon after the stop leaves its connection good for the safe outputs."""
 
 _FAILURES: Final = (LinkError, OSError, TimeoutError)
-
-
-async def ended(tasks: Collection[asyncio.Task[Any]]) -> None:
-    """Cancel tasks until they are over, whatever they end with.
-
-    Once is not enough: before Python 3.12, a task that waits with a time limit (`asyncio.wait_for`, in libraries as
-    well) loses the cancellation that comes at the same time as what it waits for.
-    """
-    cancelled: asyncio.CancelledError | None = None
-    while pending := [task for task in tasks if not task.done()]:
-        for task in pending:
-            task.cancel()
-        try:
-            await asyncio.wait(pending, timeout=_CANCELLED_AGAIN_SECONDS)
-        except asyncio.CancelledError as error:  # ours: when they are over
-            cancelled = error
-    for task in tasks:
-        if not task.cancelled():
-            task.exception()
-    if cancelled is not None:
-        raise cancelled
-
-
-async def uninterrupted(work: Coroutine[Any, Any, None]) -> None:
-    """Do something to its end, however often this is cancelled meanwhile; then the cancellation holds."""
-    task = asyncio.create_task(work)
-    cancelled: asyncio.CancelledError | None = None
-    while not task.done():
-        try:
-            await asyncio.wait((task,))
-        except asyncio.CancelledError as error:
-            cancelled = error
-    task.result()
-    if cancelled is not None:
-        raise cancelled
 
 
 async def _failed(error: Exception) -> None:
