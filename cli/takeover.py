@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from contextlib import closing
+from contextlib import ExitStack, closing
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -75,21 +75,22 @@ def takeover(
     deciding = coordinators(after.decomposition)
     machines = {file: machines_of(file) for file in journals}
     kept: dict[str, dict[str, Stored]] = {}
-    for file, names in machines.items():
-        with closing(SqliteJournal(file, before.digest, names)) as read:
+    with ExitStack() as held:  # nobody runs the old bundle on while it is taken over
+        for file, names in machines.items():
+            read = held.enter_context(closing(SqliteJournal(file, before.digest, names)))
             kept |= {name: dict(read.kept(name)) for name in names}
-    everything = [*coordinators(before.decomposition), *(subnet.name for subnet in before.decomposition.subnets)]
-    controllers = dealt_out(machines, everything, [subnet.name for subnet in after.decomposition.subnets])
-    at_top = [file for file, names in machines.items() if TOP in names and after.net.coordinator is None]
-    dealt = {file: hosted(after.net, names, coordinator=file in at_top) for file, names in controllers.items()}
-    if len(journals) == 1:
-        dealt = {file: (*deciding, *names) for file, names in controllers.items()}
-    moved = take_over(before.decomposition, after.decomposition, kept, deciding)
-    _demand_reachable(after.net, moved.marking, budget(max_markings, max_memory, max_seconds))
-    targets = dict(zip(journals, into, strict=True))
-    if len(journals) == 1 and Path(f"{journals[0]}.cell").is_file():  # the simulated cell, if the journal is of one
-        write_whole(f"{into[0]}.cell", Path(f"{journals[0]}.cell").read_bytes())
-    _write({targets[file]: names for file, names in dealt.items() if names}, after.digest, moved)
+        everything = [*coordinators(before.decomposition), *(subnet.name for subnet in before.decomposition.subnets)]
+        controllers = dealt_out(machines, everything, [subnet.name for subnet in after.decomposition.subnets])
+        at_top = [file for file, names in machines.items() if TOP in names and after.net.coordinator is None]
+        dealt = {file: hosted(after.net, names, coordinator=file in at_top) for file, names in controllers.items()}
+        if len(journals) == 1:
+            dealt = {file: (*deciding, *names) for file, names in controllers.items()}
+        moved = take_over(before.decomposition, after.decomposition, kept, deciding)
+        _demand_reachable(after.net, moved.marking, budget(max_markings, max_memory, max_seconds))
+        targets = dict(zip(journals, into, strict=True))
+        if len(journals) == 1 and Path(f"{journals[0]}.cell").is_file():  # the simulated cell, if the journal is of one
+            write_whole(f"{into[0]}.cell", Path(f"{journals[0]}.cell").read_bytes())
+        _write({targets[file]: names for file, names in dealt.items() if names}, after.digest, moved)
     click.echo(f"{', '.join(into)}: '{after.net.name}' goes on with tokens on {', '.join(moved.marking)}")
     if moved.under_way:
         click.echo(f"  under way, and asked after at the start: the commands of {', '.join(moved.under_way)}")

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import firable.cli.takeover as cli_takeover
 from firable.cli.main import main
 from firable.decompose.splitting.cut import split
 from firable.executor.journal.journal import sync_now
@@ -227,6 +228,30 @@ def test_files_that_stand_in_the_way_or_are_missing_are_told_of(
     into.unlink()
     assert main(["takeover", str(new), str(old), "--journal", str(before), "--into", str(into)]) == 2
     assert "F5031" in capsys.readouterr().err
+
+
+def test_nobody_runs_the_old_bundle_on_while_it_is_taken_over(
+    bundles: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old, new = bundles
+    before = journal(tmp_path / "old.journal", old, {"robot.free", "table.empty"})
+    names = [COORDINATOR, *(subnet.name for subnet in read_bundle(old).decomposition.subnets)]
+    command = ["takeover", str(old), str(new), "--journal", str(before), "--into", str(tmp_path / "new.journal")]
+    alive = SqliteJournal(before, read_bundle(old).digest, names)
+    assert main(command) == 2
+    assert "error[F5033]" in capsys.readouterr().err
+    assert not (tmp_path / "new.journal").exists()
+    alive.close()
+    refused: list[str] = []
+
+    def deciding(*_: object) -> None:
+        with pytest.raises(InputError) as caught:
+            SqliteJournal(before, read_bundle(old).digest, names)
+        refused.append(caught.value.diagnostics[0].code)
+
+    monkeypatch.setattr(cli_takeover, "_demand_reachable", deciding)
+    assert main(command) == 0
+    assert refused == ["F5033"]
 
 
 def test_a_run_on_the_simulated_cell_goes_on_under_the_new_bundle(
