@@ -219,6 +219,8 @@ class Host:
         if self.stopping or self.latch is not None or restart.uncertain(self):
             return False
         if self.taking_up is not None:
+            if self.peers.is_unmet:
+                return False
             restart.release(self)
         if self.paused:
             self.paused = False

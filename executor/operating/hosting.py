@@ -19,6 +19,7 @@ from firable.executor.operating.host import Host, Told
 from firable.executor.operating.local_monitor import LocalMonitor
 from firable.executor.operating.log import Log
 from firable.executor.operating.monitor import Divergence
+from firable.executor.operating.own_certificate import fault_of
 from firable.executor.operating.running import Watch
 from firable.executor.operating.service import Service, figures_for, patience_with, run_to_the_end
 from firable.executor.operating.situation import Situation
@@ -130,14 +131,14 @@ def make_link(bundle: Bundle, machines: tuple[str, ...], way: Network | SerialLi
 
     certificates = None
     if way.certificates is not None:
-        _demand_certificates(*way.certificates)
+        _demand_certificates(*way.certificates, serves=bool(way.listen), joins=bool(way.join))
         certificates = Certificates(*way.certificates)
     return ZenohLink(
         greeting, listen=way.listen, join=way.join, certificates=certificates, lease_seconds=way.lease_seconds
     )
 
 
-def _demand_certificates(authority: str, certificate: str, key: str) -> None:
+def _demand_certificates(authority: str, certificate: str, key: str, *, serves: bool, joins: bool) -> None:
     for file in (authority, certificate, key):
         read_bytes(file, CERTIFICATE_BYTES_MAX)
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
@@ -149,6 +150,10 @@ def _demand_certificates(authority: str, certificate: str, key: str) -> None:
     except (OSError, ValueError) as error:  # ssl.SSLError is an OSError
         message = f"{printable(problem)}: {printable(str(getattr(error, 'reason', None) or error))}"
         raise InputError([Diagnostic("F5062", message, "name PEM files, and a key without a password")]) from None
+    for is_server in (True,) * serves + (False,) * joins:
+        if fault := fault_of(certificate, key, is_server=is_server):
+            message = f"the certificate {printable(certificate)} cannot be used: {printable(fault)}"
+            raise InputError([Diagnostic("F5062", message, "renew it, or set the clock of this host")])
 
 
 def own_net(decomposition: Decomposition, machines: Sequence[str]) -> Net:

@@ -82,6 +82,7 @@ class Peers:
             sync_now(acts.journal)
         self.connected_to: set[str] = set()
         self.met: set[str] = set()
+        self.meeting = asyncio.Event()
         self.turned_away: dict[str, str] = {}
         """What is said of each that was refused and has not come back as it should."""
         self.is_due = False
@@ -93,6 +94,18 @@ class Peers:
         """Whether nobody who could know better was ever met: then nothing moves here."""
         others = self.needed or self.names
         return self.link is not None and bool(others) and self.memory.known.keys().isdisjoint(others)
+
+    @property
+    def nobody_met(self) -> bool:
+        """Whether none of those who could know better was met since the start."""
+        others = self.needed or self.names
+        return self.link is not None and bool(others) and self.met.isdisjoint(others)
+
+    async def somebody(self) -> None:
+        """Wait until one of them has been met."""
+        while self.nobody_met:
+            self.meeting.clear()
+            await self.meeting.wait()
 
     async def run(self) -> None:
         """Be linked to them until cancelled; raises `InputError` where the link cannot be opened, or fails."""
@@ -176,6 +189,7 @@ class Peers:
                 self._remember(peer, storage)
             self.connected_to.add(peer)
             self.met.add(peer)
+            self.meeting.set()
             self.turned_away.pop(peer, None)
             self.told("connected", f"{called(peer)} is connected")
             self.acts.repeat()

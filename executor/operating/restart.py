@@ -46,7 +46,9 @@ class TakingUp:
 async def take_up(run: Host, found: TakingUp) -> None:
     """Ask after each command; then resume, if that was said beforehand and nothing is uncertain.
 
-    A pause or a stop meanwhile takes back what was said beforehand: then only the operator's resume ends the hold.
+    A host among others waits until it has met one of them, who knows whether its journal is the right one (`peers.py`);
+    an operator who resumes it before sees where it stands. A pause or a stop meanwhile takes back what was said
+    beforehand: then only the operator's resume ends the hold.
     """
     for name, controller in run.controllers.items():
         for place, entry in controller.commands.questions:
@@ -63,6 +65,13 @@ async def take_up(run: Host, found: TakingUp) -> None:
     if run.is_over:  # by an error: nothing is resumed any more
         return
     found.is_final = True
+    if found.resume and run.peers.nobody_met:
+        run.told(
+            "held", "it is resumed when another host of the cell has been met: until then it may have another journal"
+        )
+        await run.peers.somebody()
+        if run.taking_up is not found:
+            return
     if not found.resume or run.paused or not run.resume():  # paused: as it is after a stop or a fault, too
         for name, controller in run.controllers.items():
             if controller.held:

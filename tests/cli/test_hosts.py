@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from support.certificates import Site
 from support.link_rigs import free_port
 from support.waiting import PATIENCE_SECONDS, until
 
@@ -129,6 +130,19 @@ def test_a_host_with_another_bundle_is_refused_by_name(bundle: str, tmp_path: Pa
         for process in (here, there):
             process.kill()
             process.communicate()
+
+
+@pytest.mark.parametrize("way", ["--listen", "--join"])
+def test_a_certificate_that_has_expired_is_refused_before_it_is_shown(
+    way: str, bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    expired = Site(tmp_path / "site").host("robot", valid_days=(-2, -1))
+    tls = ["--tls", expired.authority, expired.certificate, expired.key]
+    arguments = ["--controller", "robot", "--dry-run", "1", way, f"tls/127.0.0.1:{free_port()}", *tls]
+    assert main(["run", bundle, *arguments]) == 2
+    assert f"error[F5062]: the certificate {expired.certificate} cannot be used: certificate has expired" in (
+        capsys.readouterr().err
+    )
 
 
 def test_a_host_that_is_started_again_without_its_journal_is_refused_with_one_clear_error(

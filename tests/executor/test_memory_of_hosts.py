@@ -190,6 +190,31 @@ def test_a_cell_that_was_begun_anew_is_not_ended_by_a_host_of_the_old_one(tmp_pa
     run_in_virtual_time(main())
 
 
+def test_a_host_that_is_to_be_resumed_by_itself_waits_until_it_has_met_another(tmp_path: Path) -> None:
+    """Its journal may be that of yesterday; an operator who resumes it before sees where it stands."""
+
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        await asyncio.sleep(2.5)
+        for machines in ONE_EACH:
+            await cell.kill(machines)
+        cell.start(ROBOT, resume=True)
+        host = cell.hosts[ROBOT]
+        await asyncio.sleep(5)
+        assert host.situation().state is State.HELD
+        waiting = "it is resumed when another host of the cell has been met: until then it may have another journal"
+        assert ("held", waiting) in cell.told
+        for machines in ONE_EACH:
+            if machines != ROBOT:
+                cell.start(machines, resume=True)
+        await asyncio.sleep(30)
+        assert not host.controllers["robot"].held
+        await cell.stop()
+        assert cell.replayed().complete
+
+    run_in_virtual_time(main())
+
+
 def test_what_a_host_remembers_outlives_it_in_its_journal(tmp_path: Path) -> None:
     async def main() -> None:
         hosts = Hosts()
