@@ -150,7 +150,7 @@ class _Check:
     def _without_a_graph(self, error: InputError) -> CheckReport:
         """The report on a net of which the explicit engine has no room for the masks, let alone for markings.
 
-        Raises the error where no other technique holds its markings.
+        Raises the error, with what is left to do, where no other technique holds its markings.
         """
         course = ["the explicit engine has no room for the net itself"]
         for of in SPACES.values():
@@ -159,7 +159,7 @@ class _Check:
             except BudgetExceeded:
                 continue
             return _told(self._report(space), [*course, f"{of.words}: {_size(space)}"])
-        raise error
+        raise InputError([replace(each, hint="give it a larger budget of memory") for each in error.diagnostics])
 
     def _begin(self, settling: Settling, deadline: Deadline) -> None:
         """Settle, beside the search for all markings, what others follow from, by quick techniques."""

@@ -30,6 +30,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations, islice, product
 from typing import Any, Final, Generic
 
+from firable.analysis._engine import BudgetExceeded
 from firable.analysis.check import check
 from firable.analysis.methods import Method
 from firable.analysis.report import CheckReport
@@ -64,14 +65,18 @@ _Changes = tuple[Change, ...]
 def explained(report: CheckReport) -> tuple[Verdict, ...]:
     """The verdicts of a report; deadlocks with who waits for whom, violated ones with the changes that cure them.
 
-    Cures are looked for where all markings are known and at most `MARKINGS_MAX`, under interleaving.
+    Cures are looked for where all markings are known and at most `MARKINGS_MAX`, under interleaving, and the budget of
+    the report has room for what is asked of them.
     """
     told = tuple(with_circle(report.net, verdict) for verdict in report.verdicts)
     space = report.space
     if report.discipline is not Discipline.INTERLEAVING or not space.complete or space.n_markings > MARKINGS_MAX:
         return told
-    search = _Search(space, {verdict.name: verdict for verdict in told})
-    return tuple(replace(verdict, cures=search.cures(verdict)) for verdict in told)
+    try:
+        search = _Search(space, {verdict.name: verdict for verdict in told})
+        return tuple(replace(verdict, cures=search.cures(verdict)) for verdict in told)
+    except BudgetExceeded:
+        return told
 
 
 def with_circle(net: Net, verdict: Verdict) -> Verdict:

@@ -264,16 +264,27 @@ def test_schemas_are_printed(kind: str, capsys: pytest.CaptureFixture[str]) -> N
     assert schema["properties"]
 
 
-def test_a_budget_that_does_not_hold_the_net_is_unknown_and_no_crash(
+def test_a_budget_that_does_not_hold_the_net_is_unknown_and_no_crash(capsys: pytest.CaptureFixture[str]) -> None:
+    code, data = as_json(capsys, "check", "catalogue:machines-10000", "--max-memory", "1")
+    assert code == 3
+    assert [error["code"] for error in data["errors"]] == ["F3004"]
+    assert "symbolic" not in data["errors"][0]["hint"]  # it was tried
+
+
+def test_a_budget_that_holds_the_markings_and_not_what_is_asked_of_them_is_unknown_and_no_crash(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    """Nor is a cure looked for where there is no room for it."""
     net = tmp_path / "ring.firable.yaml"
     places = "".join(f"  p{i}:\n" for i in range(3000))
     moves = "".join(f"  t{i}: {{from: p{i}, to: p{(i + 1) % 3000}}}\n" for i in range(3000))
     net.write_text(f"firable: 1\ncell: ring\nplaces:\n{places}start: p0\ntransitions:\n{moves}", encoding="utf-8")
     code, data = as_json(capsys, "check", str(net), "--max-memory", "1")
     assert code == 3
-    assert [error["code"] for error in data["errors"]] == ["F3004"]
+    assert data["reports"][0]["figures"]["markings"] == 3000
+    found = {verdict["name"]: verdict for verdict in data["reports"][0]["verdicts"]}
+    assert found["quasi-live"]["status"] == "unknown"
+    assert "max_memory_bytes is used up" in found["quasi-live"]["bound"]
 
 
 def test_methods_and_costs_are_told_on_request(capsys: pytest.CaptureFixture[str]) -> None:
