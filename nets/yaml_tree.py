@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -47,6 +48,9 @@ _WORDS_DOUBTFUL: Final = _WORDS_REFUSED | {"true", "false", "<<", ""}
 
 _FORBIDDEN: Final = re.compile("[^\t\n\r -~\xa0-\u2027\u202a-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]|\ufeff")
 """What YAML does not print, and the line ends on which its versions disagree (U+0085, U+2028, U+2029)."""
+
+_TOO_DEEP: Final = "exceeded maximum nesting depth"
+"""What libyaml says from 1,000 levels on, in versions that have such a bound."""
 
 _LOADER: Final = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
@@ -109,14 +113,13 @@ def parse_tree(source: Source, file: str = "net file", begins: str = "`firable: 
             found.start() - (before.rfind("\n") + 1) + 1,
         )
     builder = _Builder(source)
-    parser = _LOADER(source.text)
     try:
-        while (event := parser.get_event()) is not None:
-            builder.take(event)
+        _read(source.text, builder)
     except yaml.MarkedYAMLError as error:
+        if error.problem == _TOO_DEEP and error.problem_mark is not None:
+            with suppress(yaml.MarkedYAMLError):  # it looks ahead, and has handed over nothing yet of what is too deep
+                _read(source.text[: error.problem_mark.index], _Builder(source))
         raise _syntax_error(source, error) from None
-    finally:
-        parser.dispose()
     if builder.problems:
         raise InputError(builder.problems)
     root = builder.root
@@ -124,6 +127,15 @@ def parse_tree(source: Source, file: str = "net file", begins: str = "`firable: 
         what = "holds comments alone" if source.text.strip() else "is empty"
         raise source.refuse("F1002", f"this is not a {file}: it {what}", f"a {file} begins with {begins}")
     return root
+
+
+def _read(text: str, builder: _Builder) -> None:
+    parser = _LOADER(text)
+    try:
+        while (event := parser.get_event()) is not None:
+            builder.take(event)
+    finally:
+        parser.dispose()
 
 
 def _syntax_error(source: Source, error: yaml.MarkedYAMLError) -> InputError:
