@@ -1,15 +1,17 @@
 //! Firing sequences: how a marking of a set is reached, one transition after another.
 //!
-//! Saturation adds markings in no order that a run could follow, so it leaves no way behind. Three are tried:
+//! Saturation adds markings in no order that a run could follow, so it leaves no way behind. Four are tried:
 //!
 //! 1. layers of a breadth-first search from M0, each found by one image of all transitions, until one meets the targets; then
 //!    back through the layers. The sequence is a shortest one. The work spent on it is bounded, because five thousand
 //!    philosophers need as many layers to starve;
-//! 2. downhill: of all targets the one that differs from M0 in the fewest places is aimed at, and fired is what makes the
+//! 2. where the targets are deadlocks, and a part of that work was in vain, firings drawn at random and by how few could
+//!    fire next (`stubborn::walk`): they run into one in milliseconds, and what it does not need is cut away;
+//! 3. downhill: of all targets the one that differs from M0 in the fewest places is aimed at, and fired is what makes the
 //!    difference smaller without leaving the markings from which the target can be reached. So the walk never goes
 //!    astray for good; where nothing makes the difference smaller, a bounded search by the smallest difference looks for
 //!    a marking that is nearer;
-//! 3. the layers again, with no bound but memory and time.
+//! 4. the layers again, with no bound but memory and time.
 //!
 //! The rejected alternative, to keep in every node how far it is from M0 (edge-valued diagrams), gives shortest sequences by
 //! saturation, at a multiple of the nodes for every net that no sequence is asked of.
@@ -23,12 +25,18 @@ use super::events::{Kind, Sense, literals};
 use super::space::{Events, Symbolic};
 use super::zdd::{EMPTY, Node, Store, TERMINAL};
 use crate::budget::{Stop, Watch};
+use crate::net::Net;
+use crate::stubborn::dependencies::Dependencies;
+use crate::stubborn::walk::{Target, walk};
 
 /// The results that the first search for layers may compute. Where the layers did not lead into one set they hardly lead
 /// into the next, so each search in vain leaves a fraction of it to those after it, down to the least.
 pub(super) const LAYERS_WORK: u64 = 8_000_000;
 const LAYERS_WORK_LEAST: u64 = 250_000;
 const IN_VAIN: u64 = 8;
+/// The firings that are drawn at random, all together, and how many deadlocks that are no targets they may end in.
+const DRAWN_MAX: u64 = 1 << 22;
+const OTHERS_MAX: u64 = 1 << 8;
 /// The markings that one search for a way out of a hollow may look at.
 const HOLLOW_MAX: usize = 20_000;
 
@@ -124,6 +132,15 @@ impl Symbolic {
             return Ok(None);
         }
         let moves = Moves::of(self);
+        let held = [roots, &[targets]].concat();
+        if self.all(&held, targets, Events::Tests, watch)? == EMPTY {
+            if let Some(walk) = self.by_layers(roots, targets, &moves, self.layers_work / IN_VAIN, watch)? {
+                return Ok(Some(walk));
+            }
+            if let Some(walk) = self.at_random(targets, &moves, watch)? {
+                return Ok(Some(walk));
+            }
+        }
         if let Some(walk) = self.by_layers(roots, targets, &moves, self.layers_work, watch)? {
             return Ok(Some(walk));
         }
@@ -132,6 +149,25 @@ impl Symbolic {
             Some(walk) => Ok(Some(walk)),
             None => self.by_layers(roots, targets, &moves, u64::MAX, watch),
         }
+    }
+
+    /// A sequence of firings that are drawn, if it comes to one of these deadlocks soon.
+    fn at_random(&mut self, targets: Node, moves: &Moves, watch: &mut Watch<'_>) -> Result<Option<Walk>, Stop> {
+        let net = Net::new(self.level_of().len(), self.transitions.clone(), &self.initial);
+        let net = net.expect("a net that was explored is well formed");
+        let dependencies = Dependencies::new(&net);
+        let mut left = DRAWN_MAX;
+        for seed in 1..=OTHERS_MAX {
+            let (found, steps) = walk(&net, &dependencies, &mut Target::Deadlock, seed, left, watch);
+            let Some(firings) = found? else { break };
+            let mut end = self.first();
+            firings.iter().for_each(|&t| moves.flip(t as usize, &mut end));
+            if holds(&self.diagram().store, targets, &end, tokens(&end)) {
+                return Ok(Some(self.walk(firings, &end, false)));
+            }
+            left = left.saturating_sub(steps);
+        }
+        Ok(None)
     }
 
     fn first(&self) -> Marking {
@@ -339,5 +375,31 @@ impl Symbolic {
             }
         }
         Ok(marking)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::unwatched;
+    use crate::net::Transition;
+
+    #[test]
+    fn firings_at_random_come_to_the_deadlock_that_is_wanted_and_to_no_other() {
+        // A ring of two places with two ways out of it, of which one is easier to take.
+        let arc = |from: &[u32], to| Transition::new(from, &[to], &[], &[], &[]);
+        let mut transitions = vec![arc(&[0], 1), arc(&[1], 0), arc(&[1], 3)];
+        transitions.extend((0..2).map(|_| arc(&[0], 2)));
+        let (mut poll, bytes) = (unwatched, 1 << 24);
+        let mut watch = Watch::new(None, &mut poll);
+        let mut space = Symbolic::explore(4, transitions, vec![0], bytes, None, &mut watch).expect("enough room");
+        let moves = Moves::of(&space);
+        for end in [2, 3] {
+            let wanted = space.single(&[], &[end]).expect("enough room");
+            let walk = space.at_random(wanted, &moves, &mut watch).expect("enough room").expect("it is near");
+            assert_eq!((walk.reached, walk.shortest), (vec![end], false));
+        }
+        let elsewhere = space.single(&[], &[0]).expect("enough room");
+        assert_eq!(space.at_random(elsewhere, &moves, &mut watch), Ok(None));
     }
 }
