@@ -37,8 +37,8 @@ use crate::seat::{LANES, MOVED_BITS, REACH, Shape, Slot};
 enum Place {
     /// It is in the set.
     Known,
-    /// The number of the slot where it belongs.
-    Free(usize),
+    /// The bucket and the slot of it where it belongs.
+    Free((usize, usize)),
     /// All buckets that would be tried for it are full.
     Full,
 }
@@ -124,6 +124,18 @@ impl<'a, S: Slot> Filling<'a, S> {
     /// that would be tried for it are full, or past the end.
     #[inline(always)]
     fn take(&mut self, home: usize, wanted: S) -> bool {
+        let taken = usize::from(self.taken[home]);
+        if taken >= LANES {
+            return self.take_later(home, wanted);
+        }
+        self.taken[home] += 1;
+        self.buckets[home][taken] = wanted;
+        true
+    }
+
+    /// The same where the bucket in which it belongs is full, as few are in a table that has just become larger.
+    #[cold]
+    fn take_later(&mut self, home: usize, wanted: S) -> bool {
         let tried = &mut self.taken[home..];
         let Some(moved) = tried.iter().take(REACH).position(|&taken| usize::from(taken) < LANES) else { return false };
         let free = usize::from(tried[moved]) % LANES;
@@ -226,15 +238,16 @@ impl<S: Slot> Exact<S> {
     }
 
     /// Where a key that is asked for stands, or where it belongs.
-    fn place_of(&self, home: usize, wanted: S) -> Place {
-        for (moved, bucket) in self.buckets()[home..home + REACH].iter().enumerate() {
+    #[inline(always)]
+    fn place_of(buckets: &[[S; LANES]], home: usize, wanted: S) -> Place {
+        for (moved, bucket) in buckets[home..home + REACH].iter().enumerate() {
             let found = S::matches(bucket, S::new(wanted.get() + moved as u64));
             if found != 0 {
                 return Place::Known;
             }
             let free = S::matches(bucket, S::new(0));
             if free != 0 {
-                return Place::Free((home + moved) * LANES + free.trailing_zeros() as usize % LANES);
+                return Place::Free((home + moved, free.trailing_zeros() as usize % LANES));
             }
         }
         Place::Full
@@ -243,35 +256,54 @@ impl<S: Slot> Exact<S> {
     /// Whether a key is in the set.
     pub fn has(&self, key: u64) -> bool {
         let (home, wanted) = self.shape.seat(self.shape.mix(key));
-        self.place_of(home, wanted) == Place::Known
+        Self::place_of(self.buckets(), home, wanted) == Place::Known
     }
 
-    /// Puts the key asked for as number `c` into the set, if it is new, after `append`, which may refuse it. There must
-    /// be room for it.
+    /// Puts those of the keys that `first_look` has left open into the set that are new, each after `new` was told its
+    /// number, which may refuse it. Ends early where all buckets are full that would be tried for one: at which.
     #[inline(always)]
-    pub fn insert(
+    fn insert(
+        &mut self,
+        asked: &Asked<S>,
+        open: Range<usize>,
+        new: &mut impl FnMut(usize) -> Result<(), Stop>,
+    ) -> Result<usize, Stop> {
+        // What is asked of the region and of the set is asked once, not for each key.
+        let buckets: &mut [[S; LANES]] = self.slots.all_mut().as_chunks_mut().0;
+        for k in open.clone() {
+            let c = usize::from(asked.open[k % ROOM]);
+            let (home, wanted) = (asked.homes[c] as usize, asked.wanted[c]);
+            match Self::place_of(buckets, home, wanted) {
+                Place::Known => {}
+                Place::Free((bucket, slot)) => {
+                    new(c)?;
+                    buckets[bucket][slot] = S::new(wanted.get() + (bucket - home) as u64);
+                    self.len += 1;
+                }
+                Place::Full => return Ok(k),
+            }
+        }
+        Ok(open.end)
+    }
+
+    /// The same, and takes more buckets where that is needed.
+    #[inline(always)]
+    pub fn insert_open(
         &mut self,
         asked: &mut Asked<S>,
-        c: usize,
+        open: usize,
         (memory, watch): (&Memory, &mut Watch<'_>),
-        append: impl FnOnce() -> Result<(), Stop>,
+        mut new: impl FnMut(usize) -> Result<(), Stop>,
     ) -> Result<(), Stop> {
+        let mut done = 0;
         loop {
-            let (home, wanted) = (asked.homes[c % ROOM] as usize, asked.wanted[c % ROOM]);
-            match self.place_of(home, wanted) {
-                Place::Known => return Ok(()),
-                Place::Free(slot) => {
-                    append()?;
-                    self.slots.all_mut()[slot] = S::new(wanted.get() + (slot / LANES - home) as u64);
-                    self.len += 1;
-                    return Ok(());
-                }
-                Place::Full => {
-                    let before = self.shape;
-                    self.grow(memory, watch)?;
-                    self.ask_again(asked, before);
-                }
+            done = self.insert(asked, done..open, &mut new)?;
+            if done == open {
+                return Ok(());
             }
+            let before = self.shape;
+            self.grow(memory, watch)?;
+            self.ask_again(asked, before);
         }
     }
 
@@ -317,8 +349,8 @@ impl<S: Slot> Exact<S> {
         for (at, bucket) in self.buckets().iter().enumerate() {
             watch.tick(LANES)?;
             moving.take(self.shape, at, bucket, 0..usize::MAX);
-            moving.leave(at + 1 == self.buckets().len(), |mixed| {
-                let (home, wanted) = shape.seat(mixed);
+            moving.leave(at + 1 == self.buckets().len(), |product| {
+                let (home, wanted) = shape.seat_of(self.shape.key_of(product));
                 fits &= filling.take(home, wanted);
             });
             if !fits {
@@ -329,16 +361,16 @@ impl<S: Slot> Exact<S> {
     }
 }
 
-/// Mixed keys on their way from one table into another. They are gathered without a branch: where a bucket's keys end, no
-/// processor guesses.
+/// Products of keys (`seat.rs`) on their way from one table into another. They are gathered without a branch: where a
+/// bucket's keys end, no processor guesses.
 struct Moving {
-    mixed: [u64; ROOM],
+    products: [u64; ROOM],
     count: usize,
 }
 
 impl Moving {
     fn new() -> Self {
-        Moving { mixed: [0; ROOM], count: 0 }
+        Moving { products: [0; ROOM], count: 0 }
     }
 
     /// Takes the keys of a bucket, by its number, that belong to some buckets.
@@ -347,7 +379,7 @@ impl Moving {
         for slot in bucket.map(|slot| slot.get()) {
             // Of an empty slot this is nothing, and is written over.
             let home = at + 1 - (slot & REACH as u64) as usize;
-            self.mixed[self.count % ROOM] = shape.mixed(home, slot);
+            self.products[self.count % ROOM] = shape.product(home, slot);
             self.count += usize::from(slot != 0) & usize::from(of.start <= home) & usize::from(home < of.end);
         }
     }
@@ -356,7 +388,7 @@ impl Moving {
     #[inline(always)]
     fn leave(&mut self, last: bool, mut to: impl FnMut(u64)) {
         if self.count > ROOM - LANES || last {
-            self.mixed[..self.count].iter().for_each(|&mixed| to(mixed));
+            self.products[..self.count].iter().for_each(|&product| to(product));
             self.count = 0;
         }
     }

@@ -175,19 +175,25 @@ impl<'a, S: Slot> ByKey<'a, S> {
     #[inline(always)]
     fn settle<W: Width>(&mut self, width: W, net: &Net, batch: &Batch, into: Into<'_, '_>) -> Result<(), Stop> {
         let (table, max, memory, watch) = into;
-        let words = width.words();
-        let exact = &mut self.keyed.exact;
-        for k in 0..exact.first_look(&mut self.asked) {
-            let c = usize::from(self.asked.open[k % ROOM]);
-            let (j, t) = (self.made[c] as usize % 64, self.made[c] as usize / 64);
-            exact.insert(&mut self.asked, c, (memory, watch), || {
-                if table.store.len() >= max {
-                    return Err(Stop::Markings);
-                }
-                let from = &batch.markings[j * words..(j + 1) * words];
-                table.store.push_flipped(width, from, net.flip(t, words), max, memory)
-            })?;
-        }
+        let (words, exact) = (width.words(), &mut self.keyed.exact);
+        let open = exact.first_look(&mut self.asked);
+        let (known, flips) = (table.store.len(), &net.flips);
+        let mut room = table.store.room(open, max, memory).chunks_exact_mut(words);
+        let (all, made) = (room.len(), &self.made);
+        let end = exact.insert_open(&mut self.asked, open, (memory, watch), |c| {
+            let Some(to) = room.next() else {
+                return Err(if known + all == max { Stop::Markings } else { Stop::Memory });
+            };
+            let (j, t) = (made[c] as usize % 64, made[c] as usize / 64);
+            let (from, flip) = (&batch.markings[j * words..][..words], &flips[t * words..][..words]);
+            for k in 0..words {
+                to[k] = from[k] ^ flip[k];
+            }
+            Ok(())
+        });
+        let new = all - room.len();
+        table.store.add(new);
+        end?;
         exact.answered(&mut self.asked, memory, watch)
     }
 }
@@ -197,8 +203,9 @@ impl<W: Width, S: Slot> Arrivals<W> for ByKey<'_, S> {
         let (table, max, memory, watch) = into;
         let key = self.keyed.span.key(&batch.markings);
         self.keyed.exact.ask(&mut self.asked, 1, |_| key, |_, _| ());
-        let append = || table.store.push(width, &batch.markings, max, memory);
-        self.keyed.exact.insert(&mut self.asked, 0, (memory, watch), append)?;
+        let open = self.keyed.exact.first_look(&mut self.asked);
+        let append = |_| table.store.push(width, &batch.markings, max, memory);
+        self.keyed.exact.insert_open(&mut self.asked, open, (memory, watch), append)?;
         self.keyed.exact.answered(&mut self.asked, memory, watch)
     }
 

@@ -135,9 +135,28 @@ impl Shape {
     /// The mixed key of a slot that has not moved.
     #[inline(always)]
     pub(crate) fn mixed(self, home: usize, slot: u64) -> u64 {
-        let product = (home as u64) << (self.bits - self.log2) | slot >> MOVED_BITS << 1;
-        let key = if self.times == 2 { product / 2 } else { product.div_ceil(3) };
-        key << (64 - self.bits)
+        self.key_of(self.product(home, slot)) << (64 - self.bits)
+    }
+
+    /// Half of two or three times a mixed key: the number of its bucket, and below it its tag. Twice as large a table has
+    /// the same products, and cuts them in two one bit further down.
+    #[inline(always)]
+    pub(crate) fn product(self, home: usize, slot: u64) -> u64 {
+        (home as u64) << (self.bits - self.log2 - 1) | slot >> MOVED_BITS
+    }
+
+    /// The mixed key of a product, in the low bits of a word.
+    #[inline(always)]
+    pub(crate) fn key_of(self, product: u64) -> u64 {
+        if self.times == 2 { product } else { (2 * product).div_ceil(3) }
+    }
+
+    /// What `seat` says of a mixed key that stands in the low bits of a word.
+    #[inline(always)]
+    pub(crate) fn seat_of<S: Slot>(self, key: u64) -> (usize, S) {
+        let (product, tag_bits) = (key * self.times / 2, self.bits - self.log2 - 1);
+        let tag = product & ((1 << tag_bits) - 1);
+        ((product >> tag_bits) as usize, S::new(tag << MOVED_BITS | 1))
     }
 }
 
@@ -155,6 +174,7 @@ mod tests {
                     let (home, slot) = shape.seat::<u64>(mixed);
                     assert!((home as u64) < shape.buckets && slot >> (bits - shape.log2 - 1 + MOVED_BITS) == 0);
                     assert_eq!(shape.mixed(home, slot), mixed);
+                    assert_eq!(shape.seat_of::<u64>(mixed >> (64 - bits)), (home, slot));
                 }
                 shape = shape.larger().expect("few buckets");
             }

@@ -68,26 +68,25 @@ impl Store {
         Ok(())
     }
 
-    /// Appends what a marking becomes by flipping some places.
+    /// Room after the last marking for so many more, to be written and then told by `add`: for fewer where `most` or the
+    /// memory allows no more.
     #[inline(always)]
-    pub fn push_flipped<W: Width>(
-        &mut self,
-        width: W,
-        marking: &[u64],
-        flip: &[u64],
-        most: usize,
-        memory: &Memory,
-    ) -> Result<(), Stop> {
-        if self.len == self.claimed {
-            self.make_room(most, memory)?;
+    pub(crate) fn room(&mut self, count: usize, most: usize, memory: &Memory) -> &mut [u64] {
+        let count = count.min(most - self.len);
+        while self.claimed - self.len < count {
+            if self.make_room(most, memory).is_err() {
+                break;
+            }
         }
-        let words = width.words();
-        let to = &mut self.region.all_mut()[self.len * words..(self.len + 1) * words];
-        for ((to, from), flip) in to.iter_mut().zip(&marking[..words]).zip(&flip[..words]) {
-            *to = from ^ flip;
-        }
-        self.len += 1;
-        Ok(())
+        let count = count.min(self.claimed - self.len);
+        &mut self.region.all_mut()[self.len * self.words..(self.len + count) * self.words]
+    }
+
+    /// Takes up as many markings as were written there.
+    #[inline(always)]
+    pub(crate) fn add(&mut self, count: usize) {
+        debug_assert!(self.len + count <= self.claimed);
+        self.len += count;
     }
 
     /// Appends markings that stand end to end.

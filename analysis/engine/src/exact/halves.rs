@@ -134,9 +134,9 @@ impl<S: Slot> Exact<S> {
     /// Puts a key, which is counted already, where it belongs; false where all buckets that would be tried are full.
     pub(crate) fn place(&mut self, key: u64) -> bool {
         let (home, wanted) = self.shape.seat::<S>(self.shape.mix(key));
-        let place = self.place_of(home, wanted);
-        if let Place::Free(slot) = place {
-            self.slots.all_mut()[slot] = S::new(wanted.get() + (slot / LANES - home) as u64);
+        let place = Self::place_of(self.buckets(), home, wanted);
+        if let Place::Free((bucket, slot)) = place {
+            self.slots.all_mut()[bucket * LANES + slot] = S::new(wanted.get() + (bucket - home) as u64);
         }
         place != Place::Full
     }
@@ -147,11 +147,12 @@ impl<S: Slot> Exact<S> {
         asked: &mut Asked<S>,
         key: u64,
         (memory, watch): (&Memory, &mut Watch<'_>),
-        new: impl FnOnce() -> Result<(), Stop>,
+        mut new: impl FnMut() -> Result<(), Stop>,
     ) -> Result<(), Stop> {
         asked.count = 0;
         self.ask(asked, 1, |_| key, |_, _| ());
-        self.insert(asked, 0, (memory, watch), new)?;
+        let open = self.first_look(asked);
+        self.insert_open(asked, open, (memory, watch), |_| new())?;
         self.answered(asked, memory, watch)
     }
 }
@@ -159,7 +160,12 @@ impl<S: Slot> Exact<S> {
 impl Shape {
     /// The key of a mixed key.
     fn key(self, mixed: u64) -> u64 {
-        (mixed >> (64 - self.bits)).wrapping_mul(INVERSE) & ((1 << self.bits) - 1)
+        self.unmixed(mixed >> (64 - self.bits))
+    }
+
+    /// The same, of one in the low bits of a word.
+    fn unmixed(self, mixed: u64) -> u64 {
+        mixed.wrapping_mul(INVERSE) & ((1 << self.bits) - 1)
     }
 }
 
@@ -237,10 +243,11 @@ impl<S: Slot> HalfExact<'_, S> {
         for (at, bucket) in from.buckets()[..until].iter().enumerate().skip(start) {
             poll()?;
             moving.take(old, at, bucket, start..end);
-            moving.leave(at + 1 == until, |mixed| {
-                let (home, wanted) = self.shape.seat::<S>(mixed);
+            moving.leave(at + 1 == until, |product| {
+                let key = old.key_of(product);
+                let (home, wanted) = self.shape.seat_of::<S>(key);
                 if !filling.take(home - self.first, wanted) {
-                    past.push(self.shape.key(mixed));
+                    past.push(self.shape.unmixed(key));
                 }
             });
         }

@@ -8,7 +8,7 @@
 //! Such a table may also be filled further than one that is copied, to nine tenths: it is for those who have no memory
 //! left.
 
-use super::{Asked, Exact, Place, ROOM};
+use super::{Asked, Exact, ROOM};
 use crate::budget::{Memory, Stop, Watch};
 use crate::region::{Region, write_first};
 use crate::seat::{LANES, REACH, Shape, Slot};
@@ -49,25 +49,15 @@ impl<S: Slot> Exact<S> {
         watch: &mut Watch<'_>,
         mut new: impl FnMut(usize) -> Result<(), Stop>,
     ) -> Result<(), Stop> {
-        for k in 0..self.first_look(asked) {
-            let c = usize::from(asked.open[k % ROOM]);
-            loop {
-                let (home, wanted) = (asked.homes[c % ROOM] as usize, asked.wanted[c % ROOM]);
-                match self.place_of(home, wanted) {
-                    Place::Known => break,
-                    Place::Free(slot) => {
-                        self.slots.all_mut()[slot] = S::new(wanted.get() + (slot / LANES - home) as u64);
-                        self.len += 1;
-                        new(c)?;
-                        break;
-                    }
-                    Place::Full => {
-                        let before = self.shape;
-                        self.grow_in_place(memory, watch)?;
-                        self.ask_again(asked, before);
-                    }
-                }
+        let (mut done, open) = (0, self.first_look(asked));
+        loop {
+            done = self.insert(asked, done..open, &mut new)?;
+            if done == open {
+                break;
             }
+            let before = self.shape;
+            self.grow_in_place(memory, watch)?;
+            self.ask_again(asked, before);
         }
         asked.count = 0;
         while 10 * (self.len + ROOM) > 9 * LANES * self.shape.buckets as usize {

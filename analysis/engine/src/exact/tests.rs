@@ -9,12 +9,10 @@ fn insert<S: Slot>(table: &mut Exact<S>, key: u64, memory: &Memory) -> Result<bo
     table.ask(&mut asked, 1, |_| key, |_, _| ());
     let open = table.first_look(&mut asked);
     let mut new = false;
-    if open > 0 {
-        table.insert(&mut asked, 0, (memory, &mut watch), || {
-            new = true;
-            Ok(())
-        })?;
-    }
+    table.insert_open(&mut asked, open, (memory, &mut watch), |_| {
+        new = true;
+        Ok(())
+    })?;
     table.answered(&mut asked, memory, &mut watch)?;
     Ok(new)
 }
