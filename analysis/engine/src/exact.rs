@@ -25,9 +25,9 @@
 pub(crate) mod halves;
 mod in_place;
 
-use std::hint::black_box;
 use std::ops::Range;
 
+use crate::ahead::fetch;
 use crate::budget::{Memory, Stop, Watch};
 use crate::region::{Region, write_first};
 use crate::seat::{LANES, MOVED_BITS, REACH, Shape, Slot};
@@ -71,23 +71,11 @@ impl<S: Slot> Default for Asked<S> {
     }
 }
 
-/// Reads a word of each bucket that is asked for, so that the cache misses of all of them overlap: there is so little
-/// between two of these reads that the processor has them all under way.
-#[inline(always)]
-fn touch<S: Slot>(buckets: &[[S; LANES]], asked: &Asked<S>) {
-    let mut read = 0;
-    for c in 0..asked.count {
-        read ^= buckets[asked.homes[c % ROOM] as usize][0].get();
-    }
-    black_box(read);
-}
-
 /// Looks at the bucket where each key belongs, and for those that are left at the next one; how many keys were not found
 /// (`open`). Loops over numbers, here and above: compilers make a fifth fewer instructions of them than of iterators joined
 /// together.
 #[inline(always)]
 fn look<S: Slot>(buckets: &[[S; LANES]], asked: &mut Asked<S>) -> usize {
-    touch(buckets, asked);
     let mut open = 0;
     for c in 0..asked.count {
         let (home, wanted) = (asked.homes[c % ROOM] as usize, asked.wanted[c % ROOM]);
@@ -207,12 +195,13 @@ impl<S: Slot> Exact<S> {
         key: impl Fn(usize) -> u64,
         mut note: impl FnMut(usize, u32),
     ) {
-        let (shape, mut count, mut rest) = (self.shape, asked.count, members);
+        let (shape, buckets, mut count, mut rest) = (self.shape, self.buckets(), asked.count, members);
         while rest != 0 {
             let (c, j) = (count % ROOM, rest.trailing_zeros());
             rest &= rest - 1;
             count += 1;
             let (home, wanted) = shape.seat(shape.mix(key(j as usize)));
+            fetch(buckets, home);
             asked.homes[c] = home as u32;
             asked.wanted[c] = wanted;
             note(c, j);

@@ -9,8 +9,7 @@
 //! then takes a third longer); to build them while exploring (each growth would move them, and most questions never
 //! ask); a table of hashes and indexes with a look at the marking itself (no further memory, and two misses too).
 
-use std::hint::black_box;
-
+use crate::ahead::fetch;
 use crate::batch::Batch;
 use crate::budget::{Memory, Stop, Watch};
 use crate::exact::ROOM;
@@ -128,15 +127,10 @@ impl<S: Slot> Indexes<S> {
         let count = keys.len().min(ROOM);
         for (c, &key) in keys.iter().enumerate().take(ROOM) {
             let (line, wanted) = shape.seat::<S>(shape.mix(key));
+            fetch(lines, line);
             asking.lines[c] = line as u32;
             asking.wanted[c] = wanted.get();
         }
-        // As in `Exact::touch`.
-        let mut read = 0;
-        for c in 0..count {
-            read ^= lines[asking.lines[c] as usize][0].get();
-        }
-        black_box(read);
         let mut open = 0;
         for c in 0..count {
             let line = &lines[asking.lines[c] as usize];

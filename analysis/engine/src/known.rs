@@ -1,11 +1,11 @@
 //! What tells the exploration that a marking is known: exact keys where they are short enough, else hashes.
 //!
 //! With keys (`span.rs`, `exact.rs`) a candidate is one word, and nothing else is computed of it until it has turned
-//! out not to stand where it belongs. Up to 256 are gathered from the bit slices; one word of each one's bucket is
-//! read, in a loop so short that the cache misses of all overlap; then the buckets are compared, and those that are
-//! left are noted without a branch and compared with the next bucket: new ones, and few known ones, are left then. Only
-//! these are looked up by a loop, and only of new ones the marking is made. Under hashes (`table.rs`) candidates are whole
-//! markings.
+//! out not to stand where it belongs. Up to 256 are gathered from the bit slices, and as soon as the
+//! bucket of one is known the processor is asked for it (`ahead.rs`), so that the cache misses of all overlap; then the
+//! buckets are compared, and those that are left are noted without a branch and compared with the next bucket: new ones, and
+//! few known ones, are left then. Only these are looked up by a loop, and only of new ones the marking is made, into room
+//! that was asked for once for all of them. Under hashes (`table.rs`) candidates are whole markings.
 //!
 //! Rejected: to look up each candidate in the pass that makes it (a tenth fewer instructions,
 //! but so many stand between two reads of the table that few cache misses overlap: two fifths of the time was waiting).

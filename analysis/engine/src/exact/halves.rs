@@ -6,12 +6,12 @@
 
 use super::{Asked, Exact, Filling, Moving, Place, ROOM};
 use crate::seat::{FACTOR, LANES, REACH, Shape, Slot};
-use std::hint::black_box;
 use std::mem;
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
+use crate::ahead::fetch;
 use crate::apart::Apart;
 use crate::budget::{Memory, Stop, Watch};
 
@@ -200,12 +200,9 @@ impl<S: Slot> HalfExact<'_, S> {
     /// (`open`).
     #[inline(always)]
     pub(crate) fn look(&self, records: &[u64], open: &mut [u8; ROOM]) -> usize {
-        // First a word of each, so that the cache misses overlap (see `exact.rs`).
-        let mut touched = 0;
         for record in records.chunks_exact(stride::<S>()) {
-            touched ^= self.buckets[read::<S>(record).0 - self.first][0].get();
+            fetch(self.buckets, read::<S>(record).0 - self.first);
         }
-        black_box(touched);
         let mut count = 0_u8;
         for (c, record) in records.chunks_exact(stride::<S>()).enumerate() {
             let (home, wanted) = read::<S>(record);

@@ -6,7 +6,8 @@
 //! usual case, a known marking in its first slot, never enters the probing loop. Only what is left is inserted one by
 //! one.
 //!
-//! Rejected: prefetch instructions (they need `unsafe`, and a read of each slot does the same).
+//! Not tried here: prefetch instructions, as where markings have keys (`ahead.rs`). A read of each slot does for that, in a
+//! pass of its own.
 
 use super::{NONE, Table};
 use crate::batch::Batch;
