@@ -249,17 +249,20 @@ impl<S: Slot> Exact<S> {
     }
 
     /// Puts those of the keys that `first_look` has left open into the set that are new, each after `new` was told its
-    /// number, which may refuse it. Ends early where all buckets are full that would be tried for one: at which.
+    /// number, which may refuse it. `done` are dealt with: fewer than `open` where one is refused, or where all buckets are
+    /// full that would be tried for it.
     #[inline(always)]
     fn insert(
         &mut self,
         asked: &Asked<S>,
-        open: Range<usize>,
+        done: &mut usize,
+        open: usize,
         new: &mut impl FnMut(usize) -> Result<(), Stop>,
-    ) -> Result<usize, Stop> {
+    ) -> Result<(), Stop> {
         // What is asked of the region and of the set is asked once, not for each key.
         let buckets: &mut [[S; LANES]] = self.slots.all_mut().as_chunks_mut().0;
-        for k in open.clone() {
+        for k in *done..open {
+            *done = k;
             let c = usize::from(asked.open[k % ROOM]);
             let (home, wanted) = (asked.homes[c] as usize, asked.wanted[c]);
             match Self::place_of(buckets, home, wanted) {
@@ -269,25 +272,26 @@ impl<S: Slot> Exact<S> {
                     buckets[bucket][slot] = S::new(wanted.get() + (bucket - home) as u64);
                     self.len += 1;
                 }
-                Place::Full => return Ok(k),
+                Place::Full => return Ok(()),
             }
         }
-        Ok(open.end)
+        *done = open;
+        Ok(())
     }
 
-    /// The same, and takes more buckets where that is needed.
+    /// The same, and takes more buckets where that is needed. Where one is refused, the same call goes on from there.
     #[inline(always)]
     pub fn insert_open(
         &mut self,
         asked: &mut Asked<S>,
+        done: &mut usize,
         open: usize,
         (memory, watch): (&Memory, &mut Watch<'_>),
         mut new: impl FnMut(usize) -> Result<(), Stop>,
     ) -> Result<(), Stop> {
-        let mut done = 0;
         loop {
-            done = self.insert(asked, done..open, &mut new)?;
-            if done == open {
+            self.insert(asked, done, open, &mut new)?;
+            if *done == open {
                 return Ok(());
             }
             let before = self.shape;

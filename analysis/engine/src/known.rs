@@ -177,23 +177,30 @@ impl<'a, S: Slot> ByKey<'a, S> {
         let (table, max, memory, watch) = into;
         let (words, exact) = (width.words(), &mut self.keyed.exact);
         let open = exact.first_look(&mut self.asked);
-        let (known, flips) = (table.store.len(), &net.flips);
-        let mut room = table.store.room(open, max, memory).chunks_exact_mut(words);
-        let (all, made) = (room.len(), &self.made);
-        let end = exact.insert_open(&mut self.asked, open, (memory, watch), |c| {
-            let Some(to) = room.next() else {
-                return Err(if known + all == max { Stop::Markings } else { Stop::Memory });
-            };
-            let (j, t) = (made[c] as usize % 64, made[c] as usize / 64);
-            let (from, flip) = (&batch.markings[j * words..][..words], &flips[t * words..][..words]);
-            for k in 0..words {
-                to[k] = from[k] ^ flip[k];
+        let (mut done, made, flips) = (0, &self.made, &net.flips);
+        while done < open {
+            let mut room = table.store.room(open - done, max).chunks_exact_mut(words);
+            let (all, mut is_full) = (room.len(), false);
+            let end = exact.insert_open(&mut self.asked, &mut done, open, (memory, watch), |c| {
+                let Some(to) = room.next() else {
+                    is_full = true;
+                    return Err(Stop::Memory);
+                };
+                let (j, t) = (made[c] as usize % 64, made[c] as usize / 64);
+                let (from, flip) = (&batch.markings[j * words..][..words], &flips[t * words..][..words]);
+                for k in 0..words {
+                    to[k] = from[k] ^ flip[k];
+                }
+                Ok(())
+            });
+            let new = all - room.len();
+            table.store.add(new);
+            if is_full {
+                table.store.more_room(max, memory)?;
+            } else {
+                end?;
             }
-            Ok(())
-        });
-        let new = all - room.len();
-        table.store.add(new);
-        end?;
+        }
         exact.answered(&mut self.asked, memory, watch)
     }
 }
@@ -205,7 +212,7 @@ impl<W: Width, S: Slot> Arrivals<W> for ByKey<'_, S> {
         self.keyed.exact.ask(&mut self.asked, 1, |_| key, |_, _| ());
         let open = self.keyed.exact.first_look(&mut self.asked);
         let append = |_| table.store.push(width, &batch.markings, max, memory);
-        self.keyed.exact.insert_open(&mut self.asked, open, (memory, watch), append)?;
+        self.keyed.exact.insert_open(&mut self.asked, &mut 0, open, (memory, watch), append)?;
         self.keyed.exact.answered(&mut self.asked, memory, watch)
     }
 

@@ -68,18 +68,18 @@ impl Store {
         Ok(())
     }
 
-    /// Room after the last marking for so many more, to be written and then told by `add`: for fewer where `most` or the
-    /// memory allows no more.
+    /// The room after the last marking, to be written and then told by `add`: for so many more, or as many as are claimed,
+    /// and not more than `most` altogether.
     #[inline(always)]
-    pub(crate) fn room(&mut self, count: usize, most: usize, memory: &Memory) -> &mut [u64] {
-        let count = count.min(most - self.len);
-        while self.claimed - self.len < count {
-            if self.make_room(most, memory).is_err() {
-                break;
-            }
-        }
-        let count = count.min(self.claimed - self.len);
+    pub(crate) fn room(&mut self, count: usize, most: usize) -> &mut [u64] {
+        let count = count.min(self.claimed.min(most) - self.len);
         &mut self.region.all_mut()[self.len * self.words..(self.len + count) * self.words]
+    }
+
+    /// Claims more of it; `most` are all that may be.
+    #[cold]
+    pub(crate) fn more_room(&mut self, most: usize, memory: &Memory) -> Result<(), Stop> {
+        if self.len >= most { Err(Stop::Markings) } else { self.make_room(most, memory) }
     }
 
     /// Takes up as many markings as were written there.

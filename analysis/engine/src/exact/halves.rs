@@ -152,7 +152,7 @@ impl<S: Slot> Exact<S> {
         asked.count = 0;
         self.ask(asked, 1, |_| key, |_, _| ());
         let open = self.first_look(asked);
-        self.insert_open(asked, open, (memory, watch), |_| new())?;
+        self.insert_open(asked, &mut 0, open, (memory, watch), |_| new())?;
         self.answered(asked, memory, watch)
     }
 }

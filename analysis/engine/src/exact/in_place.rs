@@ -51,7 +51,7 @@ impl<S: Slot> Exact<S> {
     ) -> Result<(), Stop> {
         let (mut done, open) = (0, self.first_look(asked));
         loop {
-            done = self.insert(asked, done..open, &mut new)?;
+            self.insert(asked, &mut done, open, &mut new)?;
             if done == open {
                 break;
             }

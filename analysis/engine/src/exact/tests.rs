@@ -9,7 +9,7 @@ fn insert<S: Slot>(table: &mut Exact<S>, key: u64, memory: &Memory) -> Result<bo
     table.ask(&mut asked, 1, |_| key, |_, _| ());
     let open = table.first_look(&mut asked);
     let mut new = false;
-    table.insert_open(&mut asked, open, (memory, &mut watch), |_| {
+    table.insert_open(&mut asked, &mut 0, open, (memory, &mut watch), |_| {
         new = true;
         Ok(())
     })?;
