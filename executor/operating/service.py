@@ -116,17 +116,41 @@ async def terminable(host: Host) -> Situation:
         return await host.main()
 
 
+class Inputs:
+    """The figures of what the driver of a host reads, brought up to date when somebody asks for them.
+
+    A driver counts what it has coalesced from its own beginning, and a host gets another one after an emergency stop.
+    """
+
+    def __init__(self, host: Host, figures: Metrics) -> None:
+        self.host = host
+        self.figures = figures
+        self.driver = host.driver
+        self.counted: dict[str, int] = {}
+        """What of its driver the figures have."""
+
+    def look(self) -> None:
+        """Take what the driver has read since the last look, with the rest of one that is gone."""
+        self._count()
+        if self.host.driver is not self.driver:
+            self.driver, self.counted = self.host.driver, {}
+            self._count()
+
+    def _count(self) -> None:
+        for signal, reading in self.driver.readings().items():
+            self.figures.input_read(signal, good=reading.quality is Quality.GOOD)
+            if new := reading.coalesced - self.counted.get(signal, 0):
+                self.figures.inputs_coalesced(signal, new)
+                self.counted[signal] = reading.coalesced
+
+
 async def _serving(host: Host, service: Service, figures: Metrics) -> Situation:
     from firable.executor.operating.control import serving
 
-    counted: dict[str, int] = {}
+    inputs = Inputs(host, figures)
 
     def text() -> bytes:
-        for signal, reading in host.driver.readings().items():
-            figures.input_read(signal, good=reading.quality is Quality.GOOD)
-            if new := reading.coalesced - counted.get(signal, 0):
-                figures.inputs_coalesced(signal, new)
-                counted[signal] = reading.coalesced
+        inputs.look()
         return figures.text()
 
     page = None if service.page is None else service.page(host)

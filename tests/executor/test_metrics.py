@@ -5,17 +5,20 @@ from __future__ import annotations
 import asyncio
 import io
 from collections import Counter
+from collections.abc import Mapping
 
 from prometheus_client.parser import text_string_to_metric_families
 
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.drivers.driver import Reading
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import MemoryJournal
 from firable.executor.operating.host import Host
 from firable.executor.operating.metrics import Metrics
 from firable.executor.operating.recorder import KEY, TRACE, Recorder
 from firable.executor.operating.running import execute
+from firable.executor.operating.service import Inputs
 from firable.executor.protocol.messages import Decision, Readiness, Vote
 from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.semantics.trace import CommandSent, Fired, Trace, parse_trace
@@ -111,3 +114,28 @@ def test_two_runs_in_one_process_do_not_count_into_each_other() -> None:
     first.inputs_coalesced("robot.touch", 3)
     assert samples(first)["firable_coalesced_inputs_total", ("robot.touch",)] == 3
     assert ("firable_coalesced_inputs_total", ("robot.touch",)) not in samples(second)
+
+
+class Chattering(DryRunDriver):
+    """A driver whose sensor has chattered that often since it was made."""
+
+    def __init__(self, coalesced: int) -> None:
+        super().__init__(split(NET).subnets, 1.0)
+        self.coalesced = coalesced
+
+    def readings(self) -> Mapping[str, Reading]:
+        return {"robot.touch": Reading(coalesced=self.coalesced)}
+
+
+def test_what_was_coalesced_is_counted_on_by_the_driver_that_follows_an_emergency_stop() -> None:
+    metrics, driver = Metrics(NET), Chattering(3)
+    host = Host(split(NET), driver, Recorder(NET, "", None), figures=metrics)
+    inputs = Inputs(host, metrics)
+    counted = []
+    for at_the_end, of_the_next in ((5, 0), (7, 1), (8, 4)):
+        inputs.look()
+        driver.coalesced = at_the_end  # nobody has looked since
+        driver = host.driver = Chattering(of_the_next)
+        inputs.look()
+        counted.append(samples(metrics)["firable_coalesced_inputs_total", ("robot.touch",)])
+    assert counted == [5, 13, 24]
