@@ -5,12 +5,14 @@ too, and not in its initial marking with an empty table. It is a pure machine of
 are its memory: each is a line in a file before it has any effect, and whoever reads them all has the cell back, as it
 was at the last input, with what it shows and what became of each command.
 
-    {"firable_cell": 1, "plant": "one-robot", "digest": "...", "workpieces": 10, "seed": 0}
-    [12.5, "send", "robot.to_cv1", 1]
+    {"firable_cell": 2, "plant": "one-robot", "digest": "...", "workpieces": 10, "seed": 0}
+    [12.5, "send", "robot.to_cv1", 1, 3127415032]
 
-A line that was cut off, because the process was killed while it wrote, is an input that the cell never got. Rejected:
-the cell as a server process, which would also outlive its controller, and have no virtual time; `firable sim` is
-that, for real time. Rejected: pickling the cell, which would tie the file to the code and run what it reads.
+A line that was cut off, because the process was killed while it wrote, is an input that the cell never got. Each line
+ends with a check value over itself and all before it: of inputs that have changed, or that are missing in the middle, a
+cell would be made that is somewhere else than the journal left it, and nobody could tell. Rejected: the cell as a
+server process, which would also outlive its controller, and have no virtual time; `firable sim` is that, for real time.
+Rejected: pickling the cell, which would tie the file to the code and run what it reads.
 """
 
 from __future__ import annotations
@@ -21,13 +23,15 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NoReturn
+from zlib import crc32
 
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.machines.plant_file import PlantModel
 from firable.nets.source import printable
 
-VERSION: Final = 1
+VERSION: Final = 2
+"""1 had no check values."""
 
 Input = tuple[float, str, tuple[str | int, ...]]
 """When, what, and with which arguments."""
@@ -41,6 +45,8 @@ class CellLog:
 
     def __init__(self, path: Path | str, plant: PlantModel, workpieces: int, seed: int) -> None:
         self.path = Path(path)
+        self.check = 0
+        """Over all lines so far, the header aside."""
         digest = hashlib.sha256(repr(plant).encode()).hexdigest()
         head = {
             "firable_cell": VERSION,
@@ -51,17 +57,26 @@ class CellLog:
         }
         with self._failures():
             self.descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o600)
-            data = self.path.read_bytes()
+        try:
+            with self._failures():
+                data = self.path.read_bytes()
             whole = data[: data.rfind(b"\n") + 1]
-            os.truncate(self.path, len(whole))
-        first, *lines = whole.decode("utf-8", "replace").splitlines() or [""]
-        self.is_new = not first
-        """Whether nothing was there: then no process has ever simulated this cell."""
-        if self.is_new:
-            self._write(head)
-        elif first != json.dumps(head):
-            self._refuse(f"it is not of {workpieces} workpieces with the seed {seed} in this plant '{plant.plant}'")
-        self.past: tuple[Input, ...] = tuple(map(self._input, lines))
+            first, *lines = whole.decode("utf-8", "replace").splitlines() or [""]
+            self.is_new = not first
+            """Whether nothing was there: then no process has ever simulated this cell."""
+            is_begun = self.is_new and json.dumps(head).encode().startswith(data)
+            if not is_begun and first != json.dumps(head):
+                if (its := _format_of(first)) not in {None, VERSION}:
+                    self._refuse(f"it has format {its}, and this firable writes {VERSION}")
+                self._refuse(f"it is not of {workpieces} workpieces with the seed {seed} in this plant '{plant.plant}'")
+            self.past: tuple[Input, ...] = tuple(map(self._input, lines))
+            with self._failures():
+                os.truncate(self.descriptor, len(whole))  # now that it is known to be ours
+            if self.is_new:
+                self._write(head)
+        except BaseException:
+            os.close(self.descriptor)
+            raise
 
     @property
     def end_seconds(self) -> float:
@@ -70,7 +85,7 @@ class CellLog:
 
     def add(self, at_seconds: float, what: str, *arguments: str | int) -> None:
         """Write an input, before it has its effect."""
-        self._write([at_seconds, what, *arguments])
+        self._write([at_seconds, what, *arguments, self._checked([at_seconds, what, *arguments])])
 
     def close(self) -> None:
         """Close the file."""
@@ -78,18 +93,28 @@ class CellLog:
 
     def _write(self, line: Any) -> None:
         with self._failures():
-            # One call, so that a process which is killed has written the line or has not begun the next.
-            os.write(self.descriptor, (json.dumps(line) + "\n").encode())
+            # One call, so that a process which is killed has written the line or has not begun the next. Where that has
+            # written a part only, the disk is full, and the next one says so.
+            rest = (json.dumps(line) + "\n").encode()
+            while rest:
+                rest = rest[os.write(self.descriptor, rest) :]
 
     def _input(self, line: str) -> Input:
         try:
-            at_seconds, what, *arguments = json.loads(line)
+            *whole, check = json.loads(line)
+            at_seconds, what, *arguments = whole
+            if check != self._checked(whole):
+                raise ValueError("another check value")
             return float(at_seconds), str(what), tuple(arguments)
-        except (ValueError, TypeError):
-            self._refuse(f"'{printable(line[:60])}' is no line of it")
-            raise
+        except (ValueError, TypeError, RecursionError):
+            self._refuse(f"'{printable(line[:60])}' is no line of it, or does not follow on the one before")
 
-    def _refuse(self, why: str) -> None:
+    def _checked(self, item: list[Any]) -> int:
+        """The check value of the next line."""
+        self.check = crc32(json.dumps(item).encode(), self.check)
+        return self.check
+
+    def _refuse(self, why: str) -> NoReturn:
         message = f"{printable(str(self.path))}: not the simulated cell of this run: {why}"
         raise InputError([Diagnostic("F5035", message, "run it as it was begun, or name another folder")]) from None
 
@@ -99,4 +124,16 @@ class CellLog:
             yield
         except OSError as error:
             message = f"{printable(str(self.path))}: the simulated cell cannot be kept: {error.strerror}"
-            raise InputError([Diagnostic("F5034", message, "name a folder that you may write to")]) from None
+            hint = "name a folder on a disk with room, that you may write to"
+            raise InputError([Diagnostic("F5034", message, hint)]) from None
+
+
+def _format_of(first: str) -> int | None:
+    """The format that a first line names, if it names one."""
+    try:
+        match json.loads(first):
+            case {"firable_cell": int(its)}:
+                return its
+    except (ValueError, RecursionError):
+        pass
+    return None

@@ -1,11 +1,14 @@
 """Runs that are killed (SIGKILL) at any moment and taken up: nothing is lost, nothing done twice, nothing guessed."""
 
 import asyncio
+import errno
 import io
 import json
+import os
 import subprocess
 import sys
 from collections import Counter
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +18,7 @@ from support.examples import seeds
 
 from firable.cli.main import main
 from firable.executor import State, execute
+from firable.executor.cell.cell_log import CellLog
 from firable.executor.cell.plant import Plant
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.bench import until
@@ -67,7 +71,7 @@ def test_cell_whose_controllers_are_killed_again_and_again_does_all_its_work_onc
         assert set(fired.values()) == {4}
         told = [event.place for event in trace.events if isinstance(event, CommandSent)]
         inputs = [json.loads(line) for line in (folder / "cell.journal.cell").read_text("utf-8").splitlines()[1:]]
-        received = [(place, entry) for _, what, *rest in inputs if what == "send" for place, entry in [rest]]
+        received = [(place, entry) for _, what, *rest in inputs if what == "send" for place, entry, _ in [rest]]
         assert len(set(received)) == len(received), "a machine was commanded twice for one entry"
         assert Counter(place for place, _ in received) == Counter(told)
         assert main(["replay", str(folder / "trace.jsonl"), "--net", f"catalogue:{cell}"]) == 0
@@ -200,6 +204,76 @@ def test_log_of_a_cell_that_is_damaged_is_refused(tmp_path: Path) -> None:
     code, message = refused(tmp_path)
     assert code == "F5035"
     assert "'[1.0]' is no line of it" in message
+
+
+def test_log_of_a_cell_in_which_any_byte_has_changed_is_refused_or_has_lost_its_last_line(tmp_path: Path) -> None:
+    run_here(tmp_path, seconds=8.0)
+    path, plant = tmp_path / "cell.journal.cell", plant_of("one_robot")
+    with closing(CellLog(path, plant, 2, 0)) as log:
+        past = log.past
+    data = path.read_bytes()
+    assert len(past) > 5
+    for at in range(len(data)):
+        path.write_bytes(data[:at] + bytes([data[at] ^ 0x11]) + data[at + 1 :])
+        if at == len(data) - 1:  # the end of the last line, which was cut off then
+            with closing(CellLog(path, plant, 2, 0)) as log:
+                assert log.past == past[:-1]
+        else:
+            with pytest.raises(InputError, match="F5035"):
+                CellLog(path, plant, 2, 0)
+
+
+def test_log_of_a_cell_in_which_a_line_is_missing_is_refused(tmp_path: Path) -> None:
+    run_here(tmp_path, seconds=5.0)
+    log = tmp_path / "cell.journal.cell"
+    lines = log.read_text("utf-8").splitlines(keepends=True)
+    log.write_text("".join([*lines[:2], *lines[3:]]), "utf-8")
+    code, message = refused(tmp_path)
+    assert code == "F5035"
+    assert "does not follow on the one before" in message
+
+
+def test_log_of_a_cell_of_another_format_is_refused_by_it(tmp_path: Path) -> None:
+    run_here(tmp_path, seconds=5.0)
+    log = tmp_path / "cell.journal.cell"
+    log.write_text(log.read_text("utf-8").replace('"firable_cell": 2', '"firable_cell": 1'), "utf-8")
+    assert "it has format 1, and this firable writes 2" in refused(tmp_path)[1]
+
+
+def test_file_that_is_no_log_of_a_cell_stays_as_it_is(tmp_path: Path) -> None:
+    other = tmp_path / "other"
+    for content in (b"precious\nand its end", b"precious"):
+        other.write_bytes(content)
+        with pytest.raises(InputError, match="F5035"):
+            CellLog(other, plant_of("one_robot"), 2, 0)
+        assert other.read_bytes() == content
+
+
+def test_input_of_which_the_disk_takes_a_part_only_has_no_effect_and_ends_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, plant, write = tmp_path / "cell", plant_of("one_robot"), os.write
+    log = CellLog(path, plant, 2, 0)
+    log.add(1.0, "advance")
+    left = [10]
+
+    def on_a_full_disk(descriptor: int, data: bytes) -> int:
+        if not left[0]:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        written = write(descriptor, data[: left[0]])
+        left[0] -= written
+        return written
+
+    monkeypatch.setattr(os, "write", on_a_full_disk)
+    with pytest.raises(InputError, match="the simulated cell cannot be kept: No space left on device"):
+        log.add(2.0, "send", "robot.to_cv1", 1)
+    monkeypatch.undo()
+    log.close()
+    with closing(CellLog(path, plant, 2, 0)) as again:
+        assert again.past == ((1.0, "advance", ()),)
+        again.add(3.0, "advance")
+    with closing(CellLog(path, plant, 2, 0)) as last:
+        assert [at for at, _, _ in last.past] == [1.0, 3.0]
 
 
 @pytest.mark.parametrize(
