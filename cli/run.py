@@ -134,8 +134,8 @@ def run(
         raise click.UsageError("--step is of a whole run: on one host of several, `firable operate` steps (--serve)")
     if options.is_one_of_several and (plant is not None or watch == "stop") and options.bind is None:
         raise click.UsageError("--plant and --watch are of machines: say with --bind where those of this host are")
-    if options.is_one_of_several and watch == "stop" and plant is None:
-        raise click.UsageError("say with --plant what the machines of this host should do")
+    if watch == "stop" and plant is None and not is_simulated:
+        raise click.UsageError("--watch stop holds the machines against a plant file: say with --plant which")
 
     def make() -> Report:
         from firable.cli.stepping import stepping
@@ -211,12 +211,15 @@ def _told(_kind: str, sentence: str) -> None:
 
 
 def _if_not_reported(tell: Callable[[str, str], None], kind: str, sentence: str) -> None:
-    """Tell what the report does not: a word of no use, an emergency stop that can be reset, a disk that hangs."""
+    """Tell what the report does not: a word of no use, an emergency stop that can be reset, a disk that hangs, that the
+    machines are not watched.
+    """
     from firable.executor.operating.disk_watch import ANSWERS, HANGS
     from firable.executor.operating.latch import LATCHED
     from firable.executor.operating.restart import UNASKED
+    from firable.executor.operating.watching import UNWATCHED
 
-    if kind in {UNASKED, LATCHED, HANGS, ANSWERS}:
+    if kind in {UNASKED, LATCHED, HANGS, ANSWERS, UNWATCHED}:
         tell(kind, sentence)
 
 

@@ -45,7 +45,7 @@ from firable.executor.operating.recorder import TRACE, Recorder
 from firable.executor.operating.single_step import step
 from firable.executor.operating.situation import Situation, State
 from firable.executor.operating.uncut import Patience
-from firable.executor.operating.watching import Watching
+from firable.executor.operating.watching import UNWATCHED, UNWATCHED_SENTENCE, Watching
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import Keep, Message, Sending
@@ -368,6 +368,18 @@ class Host:
         self.groups.wake()
         if self.stop_at_divergence:
             self.fail(f"the machines are not as they are modelled: {found}")
+
+    def unwatch(self) -> None:
+        """Hold the machines against their plant file no more, and tell so: they go on from somewhere in the middle."""
+        if self.watching is not None:
+            self.recorder.observers.remove(self.watching.seen)
+            self.watching = None
+            self.told(UNWATCHED, UNWATCHED_SENTENCE)
+
+    @property
+    def is_watched(self) -> bool:
+        """Whether the machines were held against their plant file to the end, or to the first divergence."""
+        return self.watching is not None or self.divergence is not None
 
     # The end
 

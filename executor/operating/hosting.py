@@ -187,17 +187,15 @@ def run_host(
 
     `resume` ends the hold after a restart by itself; `said` is what an operator says of commands, by place, where no
     machine can tell what became of them. Where a `plant` says what the machines should do, those here are held against
-    it as the run goes (`watch`), unless it is taken up. With a `service`, and `latched` to make the driver of the same
-    machines anew, it stays after an emergency stop until that is reset. Raises `InputError` as link, journal and trace
-    do, and F5003 where the plant does not fit.
+    it as the run goes (`watch`), until it is taken up or reset. With a `service`, and `latched` to make the driver of
+    the same machines anew, it stays after an emergency stop until that is reset. Raises `InputError` as link, journal
+    and trace do, and F5003 where the plant does not fit.
     """
     controllers = [subnet.name for subnet in bundle.decomposition.subnets if subnet.name in machines]
     monitor = None
     if plant is not None and watch is not Watch.IGNORE:
         monitor = LocalMonitor(bundle.decomposition, controllers, plant)
     with opened(bundle.decomposition, bundle.digest, journal_path, trace_path, machines=machines) as files:
-        if files.is_taken_up:
-            monitor = None
         figures = figures_for(bundle.net, service, machines)
         host = Host(
             bundle.decomposition,
@@ -218,7 +216,9 @@ def run_host(
             stop_at_divergence=watch is Watch.STOP,
             latched=latched,
         )
+        if files.is_taken_up:
+            host.unwatch()
         situation = run_to_the_end(host, service, figures)
     acts = host.acts
-    never_met, watched = host.peers.never_met, monitor is not None
-    return HostReport(situation, machines, acts.messages, acts.repeats, never_met, watched, host.divergence)
+    never_met = host.peers.never_met
+    return HostReport(situation, machines, acts.messages, acts.repeats, never_met, host.is_watched, host.divergence)

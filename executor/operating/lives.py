@@ -92,9 +92,7 @@ def _stay(run: Host, driver: Latched) -> None:
     """Begin the next life, latched by the emergency stop that has ended this one; what it has noted the next writes."""
     run.begin_seconds = run.now_seconds()
     run.driver, run.latch, run.said = driver, Latch(run.emergency or "", driver), {}
-    if run.watching is not None:  # it knows of no machines in the middle of their work
-        run.recorder.observers.remove(run.watching.seen)
-        run.watching = None
+    run.unwatch()
     met, is_due = run.peers.met, run.peers.is_due
     run.begin(resume=False)
     run.peers.met, run.peers.is_due = met, is_due  # who was never reached before still was not

@@ -22,6 +22,7 @@ from typing import Final
 from firable.executor.operating.aside import UntoldError
 from firable.executor.operating.disk_watch import HANGS
 from firable.executor.operating.situation import Situation, State
+from firable.executor.operating.watching import UNWATCHED
 from firable.semantics.joining import APPLIED, STANDS, VOTED
 from firable.semantics.trace import Event, Noted
 
@@ -35,9 +36,9 @@ LEVELS: Final[Mapping[str, int]] = MappingProxyType(
     {
         **dict.fromkeys(("fault", "divergence", "emergency stop", "latched", HANGS), logging.ERROR),
         **dict.fromkeys(
-            ("lost", "refused", "never-met", "dropped", "held", "unasked", "withdrawn", "untold", FROZEN, TURNED_AWAY),
-            logging.WARNING,
+            ("lost", "refused", "never-met", "dropped", "held", "unasked", "withdrawn", "untold"), logging.WARNING
         ),
+        **dict.fromkeys((FROZEN, TURNED_AWAY, UNWATCHED), logging.WARNING),
     }
 )
 """The level of each kind of note; of all others it is `info`."""

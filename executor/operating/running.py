@@ -66,7 +66,7 @@ class RunReport:
     """How many transitions each coordinator has committed."""
     simulated_seconds: float
     watched: bool = False
-    """Whether the machines were held against their plant file, from the beginning."""
+    """Whether the machines were held against their plant file, from the beginning to the end or to a divergence."""
     divergence: Divergence | None = None
     """The first thing that they did and could not have done, or did not and must have."""
 
@@ -194,8 +194,6 @@ def execute(
     cell = Plant(plant, workpieces=workpieces, seed=seed, disturbances=disturbances)
     net = decomposition.net
     with opened(decomposition, digest, journal_path, trace, simulated=(plant, workpieces, seed)) as files:
-        # A run that is taken up may begin in any marking of the machines, which no model of them tells.
-        watched = watch is not Watch.IGNORE and not files.is_taken_up
         figures = figures_for(net, service)
         driver = SimulatedDriver(cell, net, files.cell)
         host = Host(
@@ -210,13 +208,15 @@ def execute(
             resume=resume,
             said=said,
             begin_seconds=files.begin_seconds,
-            monitor=Monitor(net, plant) if watched else None,
+            monitor=None if watch is Watch.IGNORE else Monitor(net, plant),
             stop_at_divergence=watch is Watch.STOP,
             figures=figures,
             log=log,
             tell=tell,
             latched=driver.latched,
         )
+        if files.is_taken_up:
+            host.unwatch()
         situation = run_to_the_end(host, service, figures, virtual=speed is None)
     delivered = tuple(workpiece.id for workpiece in cell.delivered)
     seen = Counter((*delivered, *cell.inside))
@@ -231,7 +231,7 @@ def execute(
         messages=host.acts.messages,
         decided=_decided(decomposition, files.recorder.firings),
         simulated_seconds=host.now_seconds(),
-        watched=watched,
+        watched=host.is_watched,
         divergence=host.divergence,
     )
 
@@ -265,7 +265,6 @@ def run_bound(
     driver = bound_driver(binding, bundle.net)
     decomposition = bundle.decomposition
     with opened(decomposition, bundle.digest, journal_path, trace_path) as files:
-        watched = plant if watch is not Watch.IGNORE and not files.is_taken_up else None
         figures = figures_for(decomposition.net, service)
         host = Host(
             decomposition,
@@ -279,12 +278,14 @@ def run_bound(
             resume=resume,
             said=said,
             begin_seconds=files.begin_seconds,
-            monitor=None if watched is None else Monitor(decomposition.net, watched),
+            monitor=None if plant is None or watch is Watch.IGNORE else Monitor(decomposition.net, plant),
             stop_at_divergence=watch is Watch.STOP,
             figures=figures,
             log=log,
             latched=lambda: bound_driver(binding, bundle.net, latched=True),
         )
+        if files.is_taken_up:
+            host.unwatch()
         situation = run_to_the_end(host, service, figures)
         recorder = files.recorder
     return RunReport(
@@ -298,7 +299,7 @@ def run_bound(
         host.acts.messages,
         _decided(decomposition, recorder.firings),
         host.now_seconds(),
-        watched=watched is not None,
+        watched=host.is_watched,
         divergence=host.divergence,
     )
 

@@ -2,17 +2,28 @@
 
 The clock of the run is asked for the moment at which time alone can show something, so a machine that says nothing is
 noticed when it should have spoken, and not when something else happens.
+
+After a restart, a takeover or an emergency stop nothing is watched: machines and workpieces may then be anywhere, and
+the plant file tells of a cell from its beginning. That is told, since somebody may rely on it.
 """
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from typing import Final
 
 from firable.executor.drivers.driver import Clock
 from firable.executor.operating.local_monitor import LocalMonitor
 from firable.executor.operating.monitor import Divergence, Monitor
 from firable.semantics.trace import Event
+
+UNWATCHED: Final = "unwatched"
+"""The kind of note of machines that are not watched any more."""
+UNWATCHED_SENTENCE: Final = (
+    "from here on the machines are not held against their plant file, which does not tell where they and their "
+    "workpieces are in the middle of a run"
+)
 
 
 class Watching:

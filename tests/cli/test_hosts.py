@@ -63,6 +63,7 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
         "say with --bind",
     ),
     "no model": (["--controller", "robot", "--bind", "x", "--join", "tcp/[::1]:1", "--watch", "stop"], "with --plant"),
+    "no model of a whole run": (["--bind", "x", "--watch", "stop"], "with --plant"),
     "steps at the terminal": (["--controller", "robot", "--dry-run", "1", "--step"], "`firable operate` steps"),
     "one file for two": (["--controller", "mc", "--trace", "{bundle}", "--journal", "x"], "overwrite"),
 }

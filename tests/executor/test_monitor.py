@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import asyncio
+from collections.abc import Awaitable, Callable
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from support.watched_runs import CELLS, run_of, slower
 
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.disturbances import NeverCompletes, StuckSensor
+from firable.executor.operating.host import Host
 from firable.executor.operating.monitor import Divergence, Monitor, watch
 from firable.executor.operating.running import RunReport, Watch, execute
 from firable.executor.operating.situation import State
+from firable.executor.protocol.commands import Answer
 from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.diagnostics import InputError
 from firable.semantics.trace import CommandSent, Event, SignalChanged, Trace
@@ -147,3 +152,39 @@ def test_a_run_of_machines_as_they_are_modelled_diverges_nowhere() -> None:
     assert report.state is State.DONE
     assert report.watched
     assert report.divergence is None
+
+
+def test_machines_are_said_to_be_watched_no_more_when_a_run_goes_on_from_the_middle(tmp_path: Path) -> None:
+    def run(operator: Callable[[Host], Awaitable[None]] | None, watch: Watch = Watch.TELL) -> tuple[RunReport, int]:
+        told: list[str] = []
+        report = execute(
+            split(catalogue_net("one_robot")),
+            catalogue_plant("one_robot"),
+            workpieces=2,
+            operator=operator,
+            journal_path=tmp_path / "journal",
+            resume=True,
+            watch=watch,
+            tell=lambda kind, _: told.append(kind),
+        )
+        return report, told.count("unwatched")
+
+    async def reset_and_resumed(host: Host) -> None:
+        await asyncio.sleep(5)
+        host.emergency_stop("a person")
+        while host.reset():
+            await asyncio.sleep(0.1)
+        for place in host.net.place_index:
+            host.say(place, Answer.NOT_RECEIVED)
+        while not host.resume():
+            await asyncio.sleep(0.1)
+            for place in host.net.place_index:
+                host.say(place, Answer.NOT_RECEIVED)
+        await asyncio.sleep(1)
+        host.stop()
+
+    report, told = run(reset_and_resumed)
+    assert (report.state, report.watched, told) == (State.STOPPED, False, 1)
+    report, told = run(None)
+    assert (report.watched, told) == (False, 1)
+    assert run(None, Watch.IGNORE)[1] == 0
