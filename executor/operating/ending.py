@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final
 from firable.executor.operating import latch, restart
 from firable.executor.operating.situation import Blocked, Situation, State, blocked, blocked_here, deadlocked
 from firable.executor.operating.uncut import Patience, uncut
+from firable.executor.operating.watching import otherwise
 from firable.executor.protocol.token_player import TokenPlayer
 from firable.nets.net import Net, SignalKind
 
@@ -31,8 +32,16 @@ def situation(run: Host) -> Situation:
     """What a host is doing, and what waits for what; exact at quiescence, as far as its machines know.
 
     First comes what keeps everything waiting, whatever the net says: a disk that hangs; and while the run goes on,
-    other hosts and devices that cannot be reached, without which a gate that is awaited may be open by now.
+    other hosts and devices that cannot be reached, without which a gate that is awaited may be open by now. Behind that
+    comes that machines have done what their model excludes, of which an end has a verdict.
     """
+    found = _reached(run)
+    if run.divergence is None or run.is_over or found.state in _TOLD_ALREADY:
+        return found
+    return replace(found, message="; ".join(filter(None, (found.message, otherwise(run.divergence)))))
+
+
+def _reached(run: Host) -> Situation:
     found = _situation(run)
     away = [] if found.state in _TOLD_ALREADY else [*run.peers.absent(), *run.driver.unreached]
     return replace(found, message="; ".join(filter(None, (run.groups.disk.sentence(), *away, found.message))))
@@ -78,24 +87,24 @@ def _unready(run: Host, one: Blocked) -> Blocked:
 def ended(run: Host) -> Situation | None:
     """How the run has ended; None where it goes on."""
     if not run.is_whole:
-        return situation(run) if run.stopping and (run.has_waited or _nobody_waits(run)) else None
+        return _reached(run) if run.stopping and (run.has_waited or _nobody_waits(run)) else None
     if run.stopping:
-        return situation(run)
+        return _reached(run)
     if run.taking_up is not None:
         if not run.taking_up.is_final or run.operated:
             return None
         if run.was_done and run.is_complete():
             message = "this run was done before, and nothing moved; to run the bundle again, name a new journal"
-            return replace(situation(run), state=State.DONE, message=message)
-        return None if run.served else situation(run)
+            return replace(_reached(run), state=State.DONE, message=message)
+        return None if run.served else _reached(run)
     # What a pause holds back still has to fire before the cycle, or the work, is at its end.
     if run.draining and run.at_rest and not run.paused:
-        return replace(situation(run), state=State.STOPPED, message=AT_THE_END)
+        return replace(_reached(run), state=State.STOPPED, message=AT_THE_END)
     if run.at_rest and run.is_complete() and not (run.paused and run.operated):
-        return replace(situation(run), state=State.DONE, blocked=())
+        return replace(_reached(run), state=State.DONE, blocked=())
     # With an operator present, a cell at rest is waited for: it may be paused, or be given work.
     is_stuck = run.at_rest and not run.operated and not (run.paused and run.served)
-    return situation(run) if is_stuck or run.recorder.is_deadlock else None
+    return _reached(run) if is_stuck or run.recorder.is_deadlock else None
 
 
 async def close(run: Host, tasks: Collection[asyncio.Task[None]]) -> list[str]:

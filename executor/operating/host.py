@@ -45,7 +45,7 @@ from firable.executor.operating.recorder import TRACE, Recorder
 from firable.executor.operating.single_step import step
 from firable.executor.operating.situation import Situation, State
 from firable.executor.operating.uncut import Patience
-from firable.executor.operating.watching import UNWATCHED, UNWATCHED_SENTENCE, Watching
+from firable.executor.operating.watching import UNWATCHED, UNWATCHED_SENTENCE, Watching, otherwise
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import Keep, Message, Sending
@@ -367,7 +367,9 @@ class Host:
         self.recorder.note(found.at_seconds, "divergence", message=str(found))
         self.groups.wake()
         if self.stop_at_divergence:
-            self.fail(f"the machines are not as they are modelled: {found}")
+            self.fail(otherwise(found))
+        else:
+            self.tell_operator("divergence", otherwise(found))
 
     def unwatch(self) -> None:
         """Hold the machines against their plant file no more, and tell so: they go on from somewhere in the middle."""

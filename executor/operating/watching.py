@@ -26,6 +26,11 @@ UNWATCHED_SENTENCE: Final = (
 )
 
 
+def otherwise(found: Divergence) -> str:
+    """A divergence in a sentence."""
+    return f"the machines are not as they are modelled: {found}"
+
+
 class Watching:
     """A monitor beside a run; `tell` is called once at most."""
 

@@ -154,6 +154,32 @@ def test_a_run_of_machines_as_they_are_modelled_diverges_nowhere() -> None:
     assert report.divergence is None
 
 
+def test_a_divergence_is_told_and_stands_in_the_situation_as_it_comes() -> None:
+    told: list[tuple[str, str]] = []
+    situations: list[str] = []
+
+    async def looking(host: Host) -> None:
+        while host.divergence is None:
+            situations.append(host.situation().message)
+            await asyncio.sleep(0.1)
+        assert told == [("divergence", f"the machines are not as they are modelled: {host.divergence}")]
+        assert host.situation().message.endswith(told[0][1])
+        assert "robot.to_cv1" in told[0][1]
+        host.stop()
+
+    report = execute(
+        split(catalogue_net("one_robot")),
+        catalogue_plant("one_robot"),
+        workpieces=1,
+        disturbances=[NeverCompletes("R", "MOVE", 1)],
+        operator=looking,
+        tell=lambda kind, sentence: told.append((kind, sentence)),
+    )
+    assert situations
+    assert not any("modelled" in one for one in situations)
+    assert report.situation.message == "stopped by the operator"
+
+
 def test_machines_are_said_to_be_watched_no_more_when_a_run_goes_on_from_the_middle(tmp_path: Path) -> None:
     def run(operator: Callable[[Host], Awaitable[None]] | None, watch: Watch = Watch.TELL) -> tuple[RunReport, int]:
         told: list[str] = []
