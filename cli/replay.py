@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -95,7 +96,7 @@ def _report(
         "replay",
         ", ".join(files),
         net,
-        (verdict, *(() if machines is None else (_machines(net, trace, machines, latency_seconds),))),
+        (verdict, *(() if machines is None else (_machines(net, trace, verdict, machines, latency_seconds),))),
         notes=loaded.notes,
         files=(output,) if output else (),
         run={
@@ -133,7 +134,7 @@ def _violated(net: Net, found: Diagnostic) -> Verdict:
     return Verdict(_NAME, Status.VIOLATED, f"the trace is a trace of '{net.name}'", _METHOD, code=found.code, hint=hint)
 
 
-def _machines(net: Net, trace: Trace, argument: str, latency_seconds: float | None) -> Verdict:
+def _machines(net: Net, trace: Trace, judged: Verdict, argument: str, latency_seconds: float | None) -> Verdict:
     from firable.cli.loop import read_machines
     from firable.executor.operating.monitor import LATENCY_SECONDS, Monitor, watch
     from firable.nets.verdict import Status, Verdict
@@ -141,11 +142,47 @@ def _machines(net: Net, trace: Trace, argument: str, latency_seconds: float | No
     latency = LATENCY_SECONDS if latency_seconds is None else latency_seconds
     name, method = "machines", f"markings of the closed loop that explain what was seen, latency {latency:g} s"
     statement = f"the machines did what '{argument}' allows, as far as signals show"
-    found = watch(Monitor(net, read_machines(argument), latency_seconds=latency), trace)
+    monitor = Monitor(net, read_machines(argument), latency_seconds=latency)
+    if bound := _unwatched(trace, judged):
+        return Verdict(name, Status.UNKNOWN, statement, method, bound=bound)
+    watched, bound = _watched(trace)
+    found = watch(monitor, watched)
     if found is None:
-        return Verdict(name, Status.PROVED, statement, method)
+        return Verdict(name, Status.UNKNOWN if bound else Status.PROVED, statement, method, bound=bound)
     hint = f"at {found.at_seconds:.2f} s: {found.message}; mend the plant file, or look at that machine"
     return Verdict(name, Status.VIOLATED, statement, method, subjects=found.places, hint=hint)
+
+
+def _unwatched(trace: Trace, judged: Verdict) -> str:
+    """Why nothing can be said of the machines; empty where something can."""
+    from firable.nets.verdict import Status
+    from firable.semantics.trace import Discipline
+
+    if judged.status is Status.VIOLATED:
+        return "the trace is none of the net"
+    if trace.header.discipline is Discipline.STEP:
+        return "a cell fires one transition at a time, and this is a trace of steps"
+    if not (trace.header.signals and trace.header.commands):
+        return "the trace records no signals and commands, by which machines show what they do"
+    return ""
+
+
+def _watched(trace: Trace) -> tuple[Trace, str]:
+    """The trace up to where its run was broken off, and what is to be said of the rest, if anything happens in it.
+
+    There machines are stopped in the middle of their work, as no plant file tells of (`executor.operating.watching`).
+    """
+    from firable.semantics.trace import Noted
+
+    broken = (
+        k for k, e in enumerate(trace.events) if isinstance(e, Noted) and e.note in {"restarted", "emergency stop"}
+    )
+    if (at := next(broken, None)) is None:
+        return trace, ""
+    begun, rest = trace.events[:at], trace.events[at:]
+    goes_on = any(not isinstance(event, Noted) for event in rest)
+    bound = f"until {rest[0].at_seconds:.2f} s, where the run was broken off; of what followed no plant file tells"
+    return replace(trace, events=begun, end=None), bound if goes_on else ""
 
 
 def _show(report: Report) -> None:

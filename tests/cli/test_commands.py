@@ -16,6 +16,10 @@ from support.published import COORDINATOR_TABLE
 from firable.cli.main import COMMANDS, main
 
 ROOT = Path(__file__).parents[2]
+HEADER = (
+    '{"firable_trace": 1, "net": "one-robot", "digest": "", "discipline": "interleaving", '
+    '"signals": true, "commands": true}'
+)
 SCHEMA = json.loads(files("firable.cli").joinpath("report.schema.json").read_text(encoding="utf-8"))
 
 
@@ -205,6 +209,49 @@ def test_a_trace_with_one_firing_left_out_is_refuted(
     trace.write_text("".join(f"{line}\n" for line in lines[:-1]))
     code, _ = as_json(capsys, "replay", str(trace), "--net", bundle)
     assert code == 3
+
+
+@pytest.mark.parametrize(
+    ("lines", "says"),
+    [
+        ((HEADER, '{"at": 1.0, "fired": ["nobody"]}'), "the trace is none of the net"),
+        ((HEADER, '{"at": 1.0, "command": "nobody"}'), "the trace is none of the net"),
+        ((HEADER.replace("interleaving", "step"),), "and this is a trace of steps"),
+        ((HEADER.replace("true", "false"), '{"at": 1.0, "fired": ["G1"]}'), "records no signals and commands"),
+    ],
+)
+def test_of_machines_nothing_is_said_by_a_trace_that_does_not_show_them(
+    lines: tuple[str, ...], says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    trace = tmp_path / "a.trace.jsonl"
+    trace.write_text("".join(f"{line}\n" for line in lines))
+    cell = "catalogue:one_robot"
+    _, data = as_json(capsys, "replay", str(trace), "--net", cell, "--machines", cell)
+    verdict = data["reports"][0]["verdicts"][1]
+    assert (verdict["name"], verdict["status"]) == ("machines", "unknown")
+    assert says in verdict["bound"]
+
+
+@pytest.mark.parametrize("note", ["restarted", "emergency stop"])
+def test_machines_are_judged_up_to_where_a_run_was_broken_off(
+    note: str, bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cell, trace = "catalogue:one_robot", tmp_path / "run.trace.jsonl"
+    assert main(["run", bundle, "--workpieces", "1", "--trace", str(trace)]) == 0
+    lines = trace.read_text().splitlines()
+    at = next(k for k, line in enumerate(lines) if '"robot.to_cv1"' in line)
+    now = json.loads(lines[at])["at"]
+    # The robot stands for an hour, and then its completion comes.
+    later = [{**json.loads(line), "at": json.loads(line)["at"] + 3600} for line in lines[at + 1 :]]
+    broken = [*map(json.loads, lines[: at + 1]), {"at": now, "note": note}, *later]
+    trace.write_text("".join(f"{json.dumps(line)}\n" for line in broken))
+    code, data = as_json(capsys, "replay", str(trace), "--net", bundle, "--machines", cell)
+    verdict = data["reports"][0]["verdicts"][1]
+    assert (code, verdict["status"]) == (3, "unknown")
+    assert verdict["bound"].startswith(f"until {now:.2f} s, where the run was broken off")
+    trace.write_text("".join(f"{json.dumps(line)}\n" for line in broken if line.get("note") != note))
+    code, _ = as_json(capsys, "replay", str(trace), "--net", bundle, "--machines", cell)
+    assert code == 1, "a run that was not broken off"
 
 
 def test_a_bundle_with_one_changed_byte_does_not_run(
