@@ -181,7 +181,8 @@ def strip_picture(net: Net, trace: str, width: int | None) -> str:
     done = play(net, read)
     caption = f"{counted(done.firings, 'firing')} of {Path(trace).name}, step by step"
     draw = draw_strip if width is None else partial(draw_strip, width_max=width)
-    return draw(net, frames(net, _fired(read)), caption=caption, end=_end(net, done.marking))
+    start = None if read.header.start is None else net.marking(read.header.start.marking)
+    return draw(net, frames(net, _fired(read), start), caption=caption, end=_end(net, done.marking))
 
 
 def _fired(trace: Trace) -> list[tuple[str, ...]]:

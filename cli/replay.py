@@ -121,6 +121,8 @@ def _verdict(net: Net, trace: Trace) -> tuple[Verdict, tuple[str, ...]]:
     statement = f"the trace is a trace of '{net.name}': {text.counted(done.firings, 'firing')}"
     if done.commands:
         statement += f", {text.counted(done.commands, 'command')}"
+    if trace.header.start is not None:
+        statement += f", from the marking that was taken over: {', '.join(trace.header.start.marking)}"
     status = Status.PROVED if done.complete else Status.UNKNOWN
     bound = "" if done.complete else "the trace was cut off; all its lines so far are of the net"
     return Verdict(name, status, statement, method, bound=bound), net.names(done.marking)
@@ -164,6 +166,8 @@ def _unwatched(trace: Trace, judged: Verdict) -> str:
         return "a cell fires one transition at a time, and this is a trace of steps"
     if not (trace.header.signals and trace.header.commands):
         return "the trace records no signals and commands, by which machines show what they do"
+    if trace.header.start is not None:
+        return "the trace begins where a cell was taken over, and does not tell where its workpieces were then"
     return ""
 
 

@@ -133,7 +133,7 @@ class _Player:
         for place in net.places:
             if place.completion is not None:
                 self.awaiting.setdefault(place.completion, []).append(place.name)
-        for name in net.names(net.initial_marking):
+        for name in net.names(self.replayer.marking):
             self._enter(name, 0.0)
 
     def take(self, event: Fired | SignalChanged | CommandSent | Noted) -> None:

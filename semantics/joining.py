@@ -25,7 +25,7 @@ from typing import Final
 from firable.nets.diagnostics import Diagnostic, InputError, Span
 from firable.nets.net import Net
 from firable.nets.source import printable
-from firable.semantics.trace import End, Event, Fired, Noted, Trace
+from firable.semantics.trace import End, Event, Fired, Noted, Start, Trace
 
 VOTED: Final = "voted"
 """The note of a vote: `controller`, `round`, and in `promised` the transitions with a yes."""
@@ -160,7 +160,7 @@ def join(net: Net, traces: Sequence[Trace]) -> Trace:
         message = f"the traces do not join: nowhere before stands {joined.missing(first.next)}"
         hint = "are these the traces of one run, of all its hosts?"
         raise _refusal(first.trace, first.told + 2, message, hint)
-    header = replace(traces[0].header, machines=(), began=0.0)
+    header = replace(traces[0].header, machines=(), began=0.0, start=_start(traces))
     return Trace(header, tuple(events), _end(net, traces, now) if whole else None, traces[0].file)
 
 
@@ -206,6 +206,18 @@ def _end(net: Net, traces: Iterable[Trace], now: float) -> End:
     return End(max(now, last - began), tuple(p.name for p in net.places if p.name in marked), reason)
 
 
+def _start(traces: Sequence[Trace]) -> Start | None:
+    """Where the hosts begin, if not in M0: each says it of its own machines."""
+    starts = [trace.header.start for trace in traces if trace.header.start is not None]
+    if not starts:
+        return None
+    return Start(
+        tuple(name for start in starts for name in start.marking),
+        tuple(name for start in starts for name in start.signals),
+        tuple(name for start in starts for name in start.owed),
+    )
+
+
 def _refuse_other_hosts(net: Net, traces: Sequence[Trace]) -> None:
     """Refuse traces that are not of all machines of the net, each once, and of one version of it."""
     where: dict[str, Trace] = {}
@@ -221,6 +233,11 @@ def _refuse_other_hosts(net: Net, traces: Sequence[Trace]) -> None:
                     trace, 1, f"'{name}' has two traces: this one, and {other}", "leave one of them out"
                 )
             where[name] = trace
+    later = [trace for trace in traces if trace.header.start is not None]
+    owners = {place.owner for place in net.places}
+    if later and any(trace.header.start is None and owners & {*trace.header.machines} for trace in traces):
+        message = "this one begins where a cell was taken over, and another in the initial marking"
+        raise _not_together(later[0], 1, message, "give those of one run: all hosts are taken over together")
     names = {COORDINATOR: "the coordinator", **{c.name: f"'{c.name}'" for c in net.controllers}}
     if missing := [called for name, called in names.items() if name not in where]:
         message = f"there is no trace of {', '.join(missing)}"

@@ -4,7 +4,8 @@ Each firing must be firable, in a trace that records signals with its external g
 an output signal must send its command exactly once before the token leaves; and the last line must show the marking
 reached. A token that enters a place clears the completion signal of the place and its timer: a value from before is
 stale and opens no gate, a completion may not come before its command, and a timer is set only while the token is there
-and its completion has not come. A trace without its last line replays as incomplete.
+and its completion has not come. A trace without its last line replays as incomplete. One that begins in the middle,
+because its run has taken a cell over, is judged from the marking that its first line names.
 
 One judge for counterexamples of the analysis and logs of the executor, and the slow one on purpose: it shares no
 firing rule with what wrote the trace.
@@ -19,7 +20,18 @@ from typing import NoReturn
 from firable.nets.diagnostics import Diagnostic, InputError, Span
 from firable.nets.net import Marking, Net, Place
 from firable.semantics.player import Player
-from firable.semantics.trace import CommandSent, Discipline, End, Event, Fired, Header, Noted, SignalChanged, Trace
+from firable.semantics.trace import (
+    CommandSent,
+    Discipline,
+    End,
+    Event,
+    Fired,
+    Header,
+    Noted,
+    SignalChanged,
+    Start,
+    Trace,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +77,21 @@ class Replayer:
         """The number of the line that is judged."""
         if header.net != net.name:
             self._deviates(header, f"the trace is of the net '{header.net}'", f"this net is '{net.name}'")
+        if header.start is not None:
+            self._begin(header, header.start)
+
+    def _begin(self, header: Header, start: Start) -> None:
+        if unknown := [name for name in start.marking if name not in self.net.place_index]:
+            self._deviates(header, f"there is no place '{unknown[0]}'", "is the trace of another net?")
+        if unknown := [name for name in start.signals if name not in self.net.signal_index]:
+            self._deviates(header, f"there is no signal '{unknown[0]}'", "is the trace of another net?")
+        self.marking = self.net.marking(start.marking)
+        self.signals = dict.fromkeys(start.signals, True)
+        marked = [self.net.place(name) for name in start.marking]
+        commanding = {place.name for place in marked if place.command is not None}
+        if unowed := sorted(set(start.owed) - commanding):
+            self._deviates(header, f"a command of '{unowed[0]}' that is not due", "no token is there that sends one")
+        self.owed = set(start.owed)
 
     def _deviates(self, record: Header | Event | End, message: str, hint: str) -> NoReturn:
         span = Span(self.file, self.line, 1, json.dumps(record.to_json()))

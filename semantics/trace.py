@@ -11,8 +11,9 @@ first line is a header, the last says where the trace ended; between them stand,
 A firing that a coordinator decided bears the number of its `round` where the trace is that of one host among others;
 `firable.semantics.joining` makes one trace of those of all hosts.
 
-`at` is in seconds from the start of the run, and never runs backwards. A trace that is cut off, because the run was
-killed, has no last line. Whether a trace is one of the net is decided by `firable.semantics.replaying`.
+`at` is in seconds from the start of the run, and never runs backwards. The trace of a run that has taken a cell over
+(`firable takeover`) begins in the middle: its header has what it begins with. A trace that is cut off, because the run
+was killed, has no last line. Whether a trace is one of the net is decided by `firable.semantics.replaying`.
 """
 
 from __future__ import annotations
@@ -96,12 +97,31 @@ Event = Fired | SignalChanged | CommandSent | Noted
 
 
 @dataclass(frozen=True, slots=True)
+class Start:
+    """Where a trace begins that does not begin in M0, because its run has taken over what another one has left.
+
+    `marking` are the places with a token, `signals` those that are 1, and `owed` the places with a command still to be
+    sent. On one host of several they are those of its machines. That the net reaches the marking is not the trace's to
+    show.
+    """
+
+    marking: tuple[str, ...]
+    signals: tuple[str, ...] = ()
+    owed: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """What the first line has of it."""
+        return {"marking": list(self.marking), "signals": list(self.signals), "owed": list(self.owed)}
+
+
+@dataclass(frozen=True, slots=True)
 class Header:
     """The first line: of which net the trace is, and what it records.
 
     With `signals` the changes of external signals are recorded and gates are judged; without, gates are free. With
     `commands` the commands sent are recorded and judged. `machines` are those of the host whose trace it is, where it
-    is one of several hosts (the coordinator is ""), and `began` is when, in seconds since 1970.
+    is one of several hosts (the coordinator is ""), and `began` is when, in seconds since 1970. `start` is where it
+    begins, if not in M0.
     """
 
     net: str
@@ -111,6 +131,7 @@ class Header:
     commands: bool = False
     machines: tuple[str, ...] = ()
     began: float = 0.0
+    start: Start | None = None
 
     def to_json(self) -> dict[str, Any]:
         """The line of the trace file."""
@@ -122,6 +143,7 @@ class Header:
             "signals": self.signals,
             "commands": self.commands,
             **({"machines": list(self.machines), "began": self.began} if self.machines else {}),
+            **({"start": self.start.to_json()} if self.start is not None else {}),
         }
 
 
@@ -236,14 +258,20 @@ class _Reader:
                 if version != VERSION:
                     raise self.failure(1, line, f"version {version} of the trace format is not known")
                 machines, began = data.get("machines", []), data.get("began", 0.0)
-                if (
-                    isinstance(machines, list)
-                    and all(isinstance(name, str) for name in machines)
-                    and isinstance(began, int | float)
-                ):
-                    kind = Discipline(discipline)
-                    return Header(net, digest, kind, signals, commands, tuple(machines), float(began))
+                if _are_names(machines) and isinstance(began, int | float):
+                    kind, start = Discipline(discipline), self._start(line, data.get("start"))
+                    return Header(net, digest, kind, signals, commands, tuple(machines), float(began), start)
         raise self.failure(1, line, "not the header of a trace")
+
+    def _start(self, line: str, data: object) -> Start | None:
+        match data:
+            case None:
+                return None
+            case {"marking": list(marking), "signals": list(signals), "owed": list(owed)} if all(
+                map(_are_names, (marking, signals, owed))
+            ):
+                return Start(tuple(marking), tuple(signals), tuple(owed))
+        raise self.failure(1, line, "not where a trace begins")
 
     def event(self, number: int, line: str) -> Event | End:
         data = self.record(number, line)
@@ -263,6 +291,10 @@ class _Reader:
             case {"at": float() | int() as at, "note": str(note)}:
                 return Noted(float(at), note, {k: v for k, v in data.items() if k not in {"at", "note"}})
         raise self.failure(number, line, "not an event of a trace")
+
+
+def _are_names(data: object) -> bool:
+    return isinstance(data, list) and all(isinstance(name, str) for name in data)
 
 
 def _no_number(constant: str) -> NoReturn:

@@ -52,7 +52,8 @@ class Run:
         of the net.
         """
         frames = list(self._frames(net))
-        if stage is not None:
+        # Where workpieces were when a cell was taken over no trace says.
+        if stage is not None and self.trace.header.start is None:
             _look(frames, self.trace, stage)
         return {
             **self.summary(),
@@ -64,7 +65,9 @@ class Run:
 
     def _frames(self, net: Net) -> Iterator[dict[str, Any]]:
         replayer = Replayer(net, self.trace.header, self.trace.file)
-        yield {"marking": list(net.names(replayer.marking)), "signals": [], "what": "the initial marking"}
+        begins = "the initial marking" if self.trace.header.start is None else "the marking that was taken over"
+        shown = [name for name, value in replayer.signals.items() if value]
+        yield {"marking": list(net.names(replayer.marking)), "signals": shown, "what": begins}
         firings = 0
         for event in self.trace.events:
             replayer.take(event)

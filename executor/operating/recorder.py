@@ -22,6 +22,7 @@ import json
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from io import FileIO
 from pathlib import Path
@@ -34,7 +35,7 @@ from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.net import Marking, Net
 from firable.nets.source import printable
 from firable.semantics.joining import APPLIED, STANDS, VOTED
-from firable.semantics.trace import CommandSent, End, Event, Fired, Header, Noted, SignalChanged
+from firable.semantics.trace import CommandSent, End, Event, Fired, Header, Noted, SignalChanged, Start
 
 
 class LineStream(Protocol):
@@ -110,7 +111,8 @@ class Recorder:
     """The trace so far, its marking and its counts, which are of this process.
 
     `kept` is what `keep` gave the journal before a restart; the stream then stands at `size_bytes_of(kept)`. `machines`
-    are those of a host among others, and `began` is when its trace was begun, in seconds since 1970.
+    are those of a host among others, and `began` is when its trace was begun, in seconds since 1970. It begins in M0,
+    or at the `start` that a takeover has left.
     """
 
     def __init__(
@@ -121,11 +123,12 @@ class Recorder:
         kept: Stored | None = None,
         machines: tuple[str, ...] = (),
         began: float = 0.0,
+        start: Start | None = None,
     ) -> None:
         self.machines = machines
         self.began = float(str(kept.get("began", began))) if isinstance(kept, Mapping) else began
         self.player = TokenPlayer.of(net)
-        self.word = net.initial_marking
+        self.word = net.initial_marking if start is None else net.marking(start.marking)
         openable = [c for c in self.player.transitions.values() if c.openable]
         places = self.player.places
         self._firable = EnabledSet([(c.needs & places, c.forbids & places) for c in openable], len(net.places))
@@ -149,7 +152,8 @@ class Recorder:
                 self.unwritten = str(kept["lines"]).splitlines(keepends=True)
             self.note(self.at_seconds, "restarted")
         else:
-            self._write(Header(net.name, digest, signals=True, commands=True, machines=machines, began=self.began))
+            header = Header(net.name, digest, signals=True, commands=True, machines=machines, began=self.began)
+            self._write(replace(header, start=start))
 
     @property
     def is_deadlock(self) -> bool:

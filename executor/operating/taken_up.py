@@ -11,7 +11,7 @@ somewhere else.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,16 +20,16 @@ from firable.executor.cell.cell_log import CellLog
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.journal.sqlite_journal import SqliteJournal
 from firable.executor.operating.recorder import KEY, TRACE, LineStream, Recorder, TraceFile, size_bytes_of
+from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import Stored
-from firable.executor.protocol.stored_word import stored_word
-from firable.executor.protocol.token_player import TokenPlayer
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.interchange import net_digest
 from firable.nets.machines.plant_file import PlantModel
-from firable.nets.net import Marking, Net
+from firable.nets.net import Net
 from firable.nets.source import printable
+from firable.semantics.trace import Start
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,14 +75,14 @@ def opened(
         begun = any(journal.kept(name) for name in names)
         if cell is not None and begun:
             _demand_the_cell(cell, net)
+        is_taken_over = begun and kept is None
         if isinstance(trace, Path | str):
-            if begun:
+            if begun and not is_taken_over:
                 _demand_the_same(trace, kept)
             trace = stack.enter_context(closing(TraceFile(trace, size_bytes_of(kept))))
         now = time.time() if machines else 0.0
-        recorder = Recorder(net, net_digest(net), trace, kept, machines, now)
-        if begun and kept is None:
-            recorder.word = _joint(decomposition, journal)
+        start = start_of(decomposition, names, journal) if is_taken_over else None
+        recorder = Recorder(net, net_digest(net), trace, kept, machines, now, start)
         last = max(recorder.at_seconds, cell.end_seconds if cell is not None else 0.0, now - recorder.began)
         yield Files(journal, recorder, cell, last, begun)
 
@@ -117,10 +117,15 @@ def _demand_the_cell(cell: CellLog, net: Net) -> None:
     raise InputError([Diagnostic("F5035", message, hint)])
 
 
-def _joint(decomposition: Decomposition, journal: Journal) -> Marking:
-    """The marking that the controllers have kept, where no trace tells it: after a takeover."""
+def start_of(decomposition: Decomposition, names: Collection[str], journal: Journal) -> Start:
+    """Where the controllers here go on, which no trace has told: after a takeover."""
     held: list[str] = []
+    shown: list[str] = []
+    owed: list[str] = []
     for subnet in decomposition.subnets:
-        word = stored_word(journal.kept(subnet.name), subnet.initial_marking)
-        held += subnet.names(TokenPlayer.of(subnet).marking(word))
-    return decomposition.net.marking(held)
+        if subnet.name in names:
+            controller = LocalController.restored(decomposition, subnet.name, journal.kept(subnet.name))
+            held += subnet.names(controller.marking)
+            shown += (s.name for s in subnet.signals if controller.word & controller.player.signal_bit(s.name))
+            owed += (place for place, _ in controller.commands.owed)
+    return Start(tuple(held), tuple(shown), tuple(owed))

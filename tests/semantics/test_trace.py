@@ -16,6 +16,7 @@ from firable.semantics.trace import (
     Header,
     Noted,
     SignalChanged,
+    Start,
     Trace,
     parse_trace,
 )
@@ -95,6 +96,29 @@ def test_a_final_marking_that_was_not_reached_is_noticed() -> None:
 
 def test_a_trace_of_another_net_is_refused() -> None:
     assert "trace is of the net 'mill'" in deviation(Trace(Header("mill"), ()))
+
+
+def test_a_trace_that_begins_in_the_middle_is_judged_from_there() -> None:
+    def begun(*events: Event, start: Start, marking: tuple[str, ...]) -> Trace:
+        return Trace(Header("drill", signals=True, commands=True, start=start), events, End(2.0, marking))
+
+    owing = begun(*RUN[1:], start=Start(("busy",), (), ("busy",)), marking=("idle",))
+    assert parse_trace(text_of(owing)).header == owing.header
+    done = replay(NET, owing)
+    assert (done.firings, done.commands) == (1, 1)
+    assert replay(NET, begun(RUN[4], start=Start(("busy",), ("done",)), marking=("idle",))).firings == 1
+    assert "closed" in deviation(begun(RUN[4], start=Start(("busy",)), marking=("idle",)))
+    assert "not due" in deviation(begun(RUN[1], start=Start(("busy",)), marking=("busy",)))
+    assert deviation(begun(start=Start(("mill",)), marking=())) == "1: there is no place 'mill'"
+    assert deviation(begun(start=Start((), ("mill",)), marking=())) == "1: there is no signal 'mill'"
+    assert "not due" in deviation(begun(start=Start(("idle",), (), ("busy",)), marking=("idle",)))
+
+
+@pytest.mark.parametrize("start", ["7", "{}", '{"marking": ["busy"], "signals": [], "owed": [1]}'])
+def test_what_does_not_say_where_a_trace_begins_is_one_clear_error(start: str) -> None:
+    head, rest = text_of(trace(*RUN)).split("}\n", 1)
+    with pytest.raises(InputError, match="not where a trace begins"):
+        parse_trace(f'{head}, "start": {start}}}\n{rest}')
 
 
 def test_two_firings_at_once_are_no_interleaving() -> None:

@@ -16,6 +16,7 @@ from firable.executor.links.link import COORDINATOR, Greeting, Link
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import KEY, TRACE, Recorder, TraceFile, size_bytes_of
 from firable.executor.operating.situation import Situation
+from firable.executor.operating.taken_up import start_of
 from firable.nets.catalogue import catalogue_net
 from firable.semantics.joining import VOTED, join
 from firable.semantics.replaying import Replay, replay
@@ -69,8 +70,15 @@ class Cell:
         journal = self.journals[machines]
         kept = journal.kept(TRACE).get(KEY)
         now = asyncio.get_running_loop().time()
+        is_taken_over = kept is None and any(journal.kept(name) for name in machines)
         recorder = Recorder(
-            self.net, "", TraceFile(self.path(machines), size_bytes_of(kept)), kept, machines, began=1e9 + now
+            self.net,
+            "",
+            TraceFile(self.path(machines), size_bytes_of(kept)),
+            kept,
+            machines,
+            began=1e9 + now,
+            start=start_of(self.decomposition, machines, journal) if is_taken_over else None,
         )
         subnets = [subnet for subnet in self.decomposition.subnets if subnet.name in machines]
         greeting = Greeting("d", machines)
