@@ -9,7 +9,9 @@ It is refused unless
 
 - no round is decided and unacknowledged, and no promise is open: a decision of the old net may mean nothing in the new;
 - every place with a token is a place of the new net, which sends the same command and waits for the same completion;
-- a command that is under way belongs to a place that has the token still;
+- a command that is under way belongs to a place that has the token still, and its machine gets its commands from the
+  same places in both nets: they are numbered by these (`drivers/channels.py`), so that a machine asked by another
+  number would not know the command, and be given it again;
 - the marking is *reachable* in the new net. What was proved of the new net was proved of its reachable markings, so
   this one condition carries every verdict over. It is decided by whoever asks (`firable takeover` asks the analysis),
   because the executor proves nothing.
@@ -163,6 +165,12 @@ class _Moving:
         for place in self.marking:
             yield from self._objections(place)
         for place in self.commands:
+            if (machine := self._numbered_anew(place)) is not None:
+                yield _against(
+                    f"the command of '{place}' is under way, and '{machine}' is commanded by other places in the new "
+                    "net, by which it would have another number there",
+                    "let the machine end it, and stop the old bundle after that",
+                )
             if place not in self.marking:
                 yield _against(
                     f"the command of '{place}' is under way, and its token has gone on",
@@ -205,12 +213,24 @@ class _Moving:
                 "run the old bundle on until the token has left it",
             )
 
+    def _numbered_anew(self, place: str) -> str | None:
+        """The machine of a place, where its commands have other numbers in the new net."""
+        command = self.old.net.place(place).command
+        if command is None or _commanding(self.old.net, command.machine) == _commanding(self.new.net, command.machine):
+            return None
+        return command.machine
+
     def _records(self, subnet: Net) -> Iterator[tuple[str, Stored]]:
         """What is kept of the commands of a new controller: those under way, and the numbers of those that are over."""
         ours = {f"{PREFIX}signal/{signal.name}" for signal in subnet.signals}
         ours |= {f"{PREFIX}place/{place.name}" for place in subnet.places}
         for kept in self.controllers.values():
             yield from ((key, value) for key, value in kept.items() if key in ours)
+
+
+def _commanding(net: Net, machine: str) -> set[str]:
+    """The places that command a machine."""
+    return {place.name for place in net.places if place.command is not None and place.command.machine == machine}
 
 
 def _under_way(kept: Kept) -> Iterator[_Command]:

@@ -14,6 +14,8 @@ import firable.cli.takeover as cli_takeover
 from firable.cli.main import main
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.drivers.binding import ChannelDocument
+from firable.executor.drivers.channels import Channel
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import MemoryJournal, sync_now
 from firable.executor.journal.memory import HOSTS, remembered
@@ -62,6 +64,7 @@ WITH_INSPECTION = OLD.replace("      full:\n", "      full:\n      inspected:\n"
     "  clear: {from: [robot.worked_out, table.inspected],",
 )
 OTHER_COMMAND = OLD.replace("command: WORK", "command: GRIND")
+MORE_COMMANDS = WITH_INSPECTION.replace("      worked_out:", "      worked_out: {send: {machine: R, command: SHOW}}")
 OTHER_NAME = OLD.replace("working", "at_work")
 
 
@@ -153,6 +156,24 @@ def test_what_cannot_be_carried_over_is_refused(
     with pytest.raises(InputError) as caught:
         take_over(old, cell(text), kept_in(marking, old, **more), [COORDINATOR])
     assert reason in reasons(caught.value)
+
+
+def test_a_command_under_way_is_not_carried_to_a_net_in_which_its_machine_would_not_know_its_number() -> None:
+    """The channel of a machine numbers its commands by the places that send any."""
+    old, new = cell(OLD), cell(MORE_COMMANDS)
+    record: dict[str, Stored] = {"command/signal/robot.worked": ("robot.working", 7, "issued")}
+    numbers = []
+    for net in (old.net, new.net):
+        document = ChannelDocument(number="holding 1", taken="input 1", done="input 2")
+        channel = Channel(document, [place.name for place in net.places if place.command], frozenset())
+        numbers.append(channel.number("robot.working", 7))
+    assert numbers[0] != numbers[1]
+    marking = {"robot.working", "table.full"}
+    with pytest.raises(InputError) as caught:
+        take_over(old, new, kept_in(marking, old, robot=record), [COORDINATOR])
+    assert "'R' is commanded by other places in the new net" in reasons(caught.value)
+    over: dict[str, Stored] = {"command/signal/robot.worked": ("robot.working", 7, "over")}
+    assert set(take_over(old, new, kept_in(marking, old, robot=over), [COORDINATOR]).marking) == marking
 
 
 def test_a_place_that_is_renamed_is_no_matter_while_it_is_empty() -> None:
