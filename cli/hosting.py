@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
 import click
 
 from firable.cli import text
+from firable.cli.finite import FiniteRange
 from firable.cli.log import told_aside
 from firable.cli.report import Report
 from firable.cli.watched import machines_verdict
@@ -117,7 +118,7 @@ def host_options(command: F) -> F:
             click.option("--baud", type=click.IntRange(min=1200), default=115_200, show_default=True, metavar="N"),
             click.option(
                 "--lease",
-                type=click.FloatRange(min=0.05, max=600),
+                type=FiniteRange(min=0.05, max=600),
                 default=1.0,
                 show_default=True,
                 metavar="SECONDS",
@@ -136,7 +137,7 @@ def host_options(command: F) -> F:
             click.option("--bind", metavar="FILE", help="Run on real machines: where they and the sensors are."),
             click.option(
                 "--dry-run",
-                type=click.FloatRange(min=0.0),
+                type=FiniteRange(min=0.0),
                 metavar="SECONDS",
                 help="Run without machines: each command is done after so long, each sensor shows 1.",
             ),

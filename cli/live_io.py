@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from firable.cli.choice import OneOf
+from firable.cli.finite import FiniteRange
 from firable.cli.options import load_net
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ _COLOURS = {"good": "green", "uncertain": "yellow", "bad": "red"}
 @click.command("io", short_help="Show the live signals of a binding; force them where it allows that.")
 @click.argument("bind", metavar="BIND")
 @click.option("--once", is_flag=True, help="Show everything once, when it has been read, and end.")
-@click.option("--for", "seconds", type=click.FloatRange(min=0), metavar="SECONDS", help="End by itself after so long.")
+@click.option("--for", "seconds", type=FiniteRange(min=0), metavar="SECONDS", help="End by itself after so long.")
 @click.option("--force", metavar="SIGNAL=0|1", multiple=True, help="Write a signal on its device.")
 @click.option("--send", metavar="PLACE", multiple=True, help="Send the command of a place; needs --net.")
 @click.option(

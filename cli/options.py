@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from firable.cli.choice import OneOf
+from firable.cli.finite import FiniteRange
 from firable.cli.report import Outcome, Report, document, exit_code_of, worst
 
 if TYPE_CHECKING:
@@ -94,9 +95,7 @@ def with_page(make: Callable[[], Report], path: str | None) -> Callable[[], Repo
 def analysis_options(command: F) -> F:
     """The options of everything that explores a net."""
     for option in (
-        click.option(
-            "--max-seconds", type=click.FloatRange(min=0), metavar="SECONDS", help="Give up after so much time."
-        ),
+        click.option("--max-seconds", type=FiniteRange(min=0), metavar="SECONDS", help="Give up after so much time."),
         click.option(
             "--max-memory",
             type=click.IntRange(min=1),

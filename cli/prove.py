@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from firable.cli import text
+from firable.cli.finite import FiniteRange
 from firable.cli.loop import machines_option, read_machines
 from firable.cli.options import answer, formats_option, load_net, net_argument, page_option, with_page, write_folder
 from firable.cli.progress import stages
@@ -31,7 +32,7 @@ SIGNS: Final = {"violated": ("✗", "red"), "unknown": ("?", "yellow"), "proved"
 @click.option("--smt-dir", metavar="DIR", help="Write the obligations as SMT-LIB 2 files, for another solver.")
 @click.option(
     "--timeout",
-    type=click.FloatRange(min=0.001),
+    type=FiniteRange(min=0.001),
     default=60.0,
     show_default=True,
     metavar="SECONDS",

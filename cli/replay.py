@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from firable.cli import text
+from firable.cli.finite import FiniteRange
 from firable.cli.options import answer, format_option, load_net, write_text
 from firable.cli.report import Report
 
@@ -33,7 +34,7 @@ _NAME, _METHOD = "trace", "replay by the reference player"
 @click.option(
     "--latency",
     "latency_seconds",
-    type=click.FloatRange(min=0.0, min_open=True),
+    type=FiniteRange(min=0.0, min_open=True),
     help="With --machines: how many seconds after its change a signal is taken at the latest.  [default: 0.5]",
 )
 @click.option("-o", "--output", metavar="FILE", help="Write the one trace that the traces of several hosts make.")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from firable.cli.finite import FiniteRange
 from firable.cli.options import CATALOGUE, catalogue_file, load_net, write_text
 
 if TYPE_CHECKING:
@@ -34,14 +35,14 @@ _PRESSED_SECONDS = 1.0
 @click.option("--bind", metavar="FILE", help="The binding: written where protocols are named, or else read and served.")
 @click.option("--workpieces", type=click.IntRange(min=0), default=10, show_default=True, help="How many will come.")
 @click.option("--seed", type=int, default=0, show_default=True, help="The seed of the cell's jitter.")
-@click.option("--speed", type=click.FloatRange(min=0.01), default=1.0, show_default=True, help="Times real time.")
+@click.option("--speed", type=FiniteRange(min=0.01), default=1.0, show_default=True, help="Times real time.")
 @click.option("--stuck", metavar="SIGNAL=0|1[@S]", multiple=True, help="A sensor that shows one value, from a time on.")
 @click.option("--drop", metavar="MACHINE.COMMAND[#N]", multiple=True, help="What is held falls as this ends.")
 @click.option("--hang", metavar="MACHINE.COMMAND[#N]", multiple=True, help="A command that is taken and never done.")
 @click.option(
-    "--press", type=click.FloatRange(min=0), metavar="SECONDS", help="Press the emergency stop then, for a second."
+    "--press", type=FiniteRange(min=0), metavar="SECONDS", help="Press the emergency stop then, for a second."
 )
-@click.option("--for", "seconds", type=click.FloatRange(min=0), metavar="SECONDS", help="End by itself after so long.")
+@click.option("--for", "seconds", type=FiniteRange(min=0), metavar="SECONDS", help="End by itself after so long.")
 def sim(
     net: str,
     plant: str | None,

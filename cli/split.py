@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from firable.cli import text
+from firable.cli.finite import FiniteRange
 from firable.cli.net_files import demand_a_file, write_net, write_nets
 from firable.cli.options import (
     answer,
@@ -50,7 +51,7 @@ _CONTROLLERS_MAX = 30  # told of in text; the JSON has them all
 )
 @click.option(
     "--slack",
-    type=click.FloatRange(min=0),
+    type=FiniteRange(min=0),
     default=0.6,
     show_default=True,
     metavar="SHARE",
@@ -60,7 +61,7 @@ _CONTROLLERS_MAX = 30  # told of in text; the JSON has them all
 @click.option("--subnets", "subnet_dir", metavar="DIR", help="Write the subnet of each controller as a net file.")
 @click.option(
     "--max-seconds",
-    type=click.FloatRange(min=0),
+    type=FiniteRange(min=0),
     default=20.0,
     show_default=True,
     metavar="SECONDS",

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from firable.cli.choice import OneOf
+from firable.cli.finite import FiniteRange
 from firable.cli.options import answer_all, formats_option, load_net, refuse_a_net, write_folder
 from firable.cli.progress import stages
 from firable.cli.report import Report
@@ -41,7 +42,7 @@ _CLAIM_MAX = 100  # characters told of one claim
 @click.option("--smt-dir", metavar="DIR", help="Write each obligation as an SMT-LIB 2 file, for another solver.")
 @click.option(
     "--timeout",
-    type=click.FloatRange(min=0.001),
+    type=FiniteRange(min=0.001),
     default=60.0,
     show_default=True,
     metavar="SECONDS",

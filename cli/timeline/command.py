@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from firable.cli.finite import FiniteRange
 from firable.cli.options import load_net, write_text
 from firable.cli.text import counted
 
@@ -36,8 +37,8 @@ _WRITERS: Final = {".vcd": ("vcd", "vcd"), ".perfetto.json": ("perfetto", "perfe
     required=True,
     help="*.svg, *.vcd, *.perfetto.json or *.xes: the extension says which; - is an SVG on standard output.",
 )
-@click.option("--from", "since", type=click.FloatRange(min=0.0), metavar="SECONDS", help="Draw from this time on.")
-@click.option("--to", "until", type=click.FloatRange(min=0.0), metavar="SECONDS", help="Draw up to this time.")
+@click.option("--from", "since", type=FiniteRange(min=0.0), metavar="SECONDS", help="Draw from this time on.")
+@click.option("--to", "until", type=FiniteRange(min=0.0), metavar="SECONDS", help="Draw up to this time.")
 def timeline(traces: tuple[str, ...], of: str, output: str, since: float | None, until: float | None) -> int:
     """Draw TRACE, a log of `firable run`, as a timeline with a lane for each machine.
 

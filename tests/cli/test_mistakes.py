@@ -317,3 +317,25 @@ def test_a_file_where_a_folder_is_wanted_is_said_to_be_one(tmp_path: Path, capsy
     (tmp_path / "taken").write_text("x")
     said = refused(capsys, "prove", "catalogue:conceptual_one_robot", "--smt-dir", str(tmp_path / "taken"))
     assert "taken: cannot be written: this is a file, and a folder is wanted" in said
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("sim", "catalogue:one_robot", "--modbus", "--press"),
+        ("sim", "catalogue:one_robot", "--modbus", "--speed"),
+        ("sim", "catalogue:one_robot", "--modbus", "--for"),
+        ("io", "cell.bind.yaml", "--for"),
+        ("run", "cell.bundle", "--controller", "robot", "--dry-run"),
+        ("run", "cell.bundle", "--lease"),
+        ("check", "catalogue:one_robot", "--max-seconds"),
+        ("replay", "run.trace", "--net", "catalogue:one_robot", "--machines", "catalogue:one_robot", "--latency"),
+    ],
+    ids=" ".join,
+)
+@pytest.mark.parametrize("number", ["nan", "inf"])
+def test_what_is_a_number_for_python_alone_is_refused(
+    command: tuple[str, ...], number: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = refused(capsys, *command, number)
+    assert "is not a finite number" in said or "is not in the range" in said
