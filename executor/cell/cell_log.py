@@ -17,6 +17,7 @@ Rejected: pickling the cell, which would tie the file to the code and run what i
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
@@ -124,7 +125,9 @@ class CellLog:
             yield
         except OSError as error:
             message = f"{printable(str(self.path))}: the simulated cell cannot be kept: {error.strerror}"
-            hint = "name a folder on a disk with room, that you may write to"
+            hint = "name a folder that you may write to"
+            if error.errno in {errno.ENOSPC, errno.EDQUOT}:
+                hint = "make room on its disk; the same command then takes the run up"
             raise InputError([Diagnostic("F5034", message, hint)]) from None
 
 

@@ -257,6 +257,10 @@ def _failures(path: Path, done: str) -> Iterator[None]:
             reason = _why_not_opened(path) or reason
         message = f"{shown}: the journal cannot be {done}: {reason}"
         hint = "name a folder on a disk with room, that you may write to"
+        if (
+            done == "written"
+        ):  # in another folder the run would begin anew, beside machines that are in the middle of it
+            hint = "make room on its disk, or see what is the matter with it; the same command then takes the run up"
         raise InputError([Diagnostic("F5034", message, hint)]) from None
 
 

@@ -265,8 +265,9 @@ def test_input_of_which_the_disk_takes_a_part_only_has_no_effect_and_ends_the_ru
         return written
 
     monkeypatch.setattr(os, "write", on_a_full_disk)
-    with pytest.raises(InputError, match="the simulated cell cannot be kept: No space left on device"):
+    with pytest.raises(InputError, match="the simulated cell cannot be kept: No space left on device") as full:
         log.add(2.0, "send", "robot.to_cv1", 1)
+    assert "make room on its disk" in full.value.diagnostics[0].hint
     monkeypatch.undo()
     log.close()
     with closing(CellLog(path, plant, 2, 0)) as again:

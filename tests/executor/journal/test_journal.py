@@ -264,9 +264,14 @@ def test_write_that_fails_ends_the_journal(tmp_path: Path) -> None:
     journal = filled(tmp_path)
     journal.connection.execute("pragma max_page_count = 1")
     journal.write("a", [Keep("word", "x" * 100_000)])
-    code, message = refused(lambda: sync_now(journal))
+    with pytest.raises(InputError) as caught:
+        sync_now(journal)
+    (found,) = caught.value.diagnostics
+    code, message = found.code, found.message
     assert code == "F5034"
     assert "full" in message
+    assert "make room on its disk" in found.hint
+    assert "folder" not in found.hint, "in another one the run would begin anew, beside machines in the middle of it"
     journal.connection.execute("pragma max_page_count = 100000")
     assert refused(lambda: sync_now(journal)) == (code, message)  # not tried again: nobody knows what is stored
     left = sqlite(crashed(journal, tmp_path / "left"))
