@@ -32,7 +32,7 @@ export PYO3_PYTHON = $(abspath $(BIN)/python)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test fmt docs page bench bench-instructions campaign simulate mutants clean lint lint-python lint-ruff
+.PHONY: help demo test fmt docs page bench bench-instructions campaign simulate explore mutants clean lint lint-python lint-ruff
 .PHONY: lint-format lint-types lint-rust lint-rust-format lint-clippy test-rust test-python
 
 help: ## these lines
@@ -97,6 +97,9 @@ campaign: $(MADE)/develop ## every property of the tests on FACTOR times as many
 simulate: $(MADE)/develop ## the executor through faults, RUNS seeds on each cell and on drawn nets; FROM is the first seed
 	@set -e; for net in $(REHEARSED); do \
 		$(BIN)/firable rehearse $$net --seeds $(RUNS) --from $(FROM) --jobs $(JOBS); done
+
+explore: $(MADE)/develop ## the machines of the cells, each alone, held to the proof as far as they end; CELLS names some
+	$(BIN)/python tests/explore_cells.py $(CELLS)
 
 mutants: $(MADE)/mutants ## which wrong edits of FILE the tests in TESTS do not notice
 	@test -n "$(FILE)" -a -n "$(TESTS)" || { echo "make mutants FILE=semantics/firing.py TESTS=tests/semantics"; exit 2; }

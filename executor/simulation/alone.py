@@ -17,63 +17,79 @@ pairs are of two different times of the cell, and what a machine does with an or
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
 from firable.executor.protocol.messages import EPOCH_BITS, Effect, Message
 from firable.executor.protocol.token_player import Word
 from firable.executor.simulation.exploring import Explorer
+from firable.executor.simulation.likeness import (
+    forget,
+    forgetting,
+    lasts,
+    liken,
+    may_be_told_again,
+    told_again,
+)
 from firable.executor.simulation.numbering import Kept, Kind, Ranking, apply, count_of
-from firable.executor.simulation.repertoire import Configuration, Job, Step
+from firable.executor.simulation.repertoire import Budget, Configuration, Job, Step
 from firable.executor.simulation.snapshots import clone
 from firable.executor.simulation.surroundings import Reach, Surroundings
 from firable.nets.decomposition import Decomposition
 
 
-class Alone(Explorer):
-    """Explores one controller of a decomposition; the other machines of its configurations are those of the start."""
+class OneMachine(Explorer):
+    """Explores one machine of a decomposition; the other machines of its configurations are those of the start."""
 
     def __init__(
         self,
         decomposition: Decomposition,
         name: str,
-        reach: Reach,
         *,
+        coordinator: type[Coordinator] = Coordinator,
         controller: type[LocalController] = LocalController,
     ) -> None:
-        super().__init__(decomposition, controller=controller)
+        super().__init__(decomposition, coordinator=coordinator, controller=controller)
         self.which = self.names.index(name)
-        self.sensors = tuple(sensor for sensor in self.sensors if self.owner_of[sensor] == self.which)
-        self.surroundings = Surroundings(decomposition, reach)
+        self.budget: Budget | None = None
         self.spread = _Spread(self.coordinators)
+        self.choices: dict[int, list[int]] = {}
         self.recounted: dict[tuple[int, frozenset[Job]], tuple[int, frozenset[Job]]] = {}
 
     def steps(self, at: Configuration) -> Iterator[tuple[Step, Configuration]]:
-        """Everything that may happen to the controller, and where it leads."""
-        which, number = self.which, self._spread(at.machines[self.which])
-        at = self._with(number, at, at.jobs)
-        machine = self.machine(number)
-        if not isinstance(machine, LocalController):
-            raise TypeError(f"{self.names[which]!r} is no controller")
-        for message in self.surroundings.messages(machine):
-            yield from self._arrives(at, message)
-        yield from self._acts_of(at, which)
-        yield from self._of_cell(at)
-        yield from self._does(at, "repeat", which, None, lambda machine: machine.resend())
-        if at.budget.crashes:
-            yield self._crashes(at, which, at, number, ())
+        """Everything that may happen to the machine, and where it leads."""
+        for step, after in self.happenings(at):
+            number = after.machines[self.which]
+            if (known := self.choices.get(number)) is None:
+                known = self.choices[number] = list(self.likened(number))
+            for left in known:
+                yield step, after if left == number else self.counted(self.at(left, after, after.jobs))
+
+    def happenings(self, at: Configuration) -> Iterator[tuple[Step, Configuration]]:
+        """Everything that may happen to the machine, and where it leads, with all that the machine knows."""
+        raise NotImplementedError
+
+    def likened(self, number: int) -> Iterator[int]:
+        """The machines like one, which know less."""
+        raise NotImplementedError
+
+    def initial(self, budget: Budget) -> Configuration:
+        """The machine started for the first time; of what it may suffer once it may suffer any number."""
+        self.budget = budget
+        return super().initial(budget)
 
     def counted(self, found: Configuration) -> Configuration:
-        """The configuration with the numbers of the controller counted from the beginning; nothing is under way."""
+        """The configuration with the numbers of the machine counted from the beginning; nothing is under way."""
         number = found.machines[self.which]
         if (known := self.recounted.get((number, found.jobs))) is None:
             ranking = self.ranking((number, *found.jobs))
             jobs = ((p, ranking.entry(count_of(p, self.net), entry), how) for p, entry, how in found.jobs)
             known = self.recounted[number, found.jobs] = self._renumbered(number, ranking), frozenset(jobs)
-        return self._with(known[0], found, known[1])
+        return self.at(known[0], found, known[1])
 
     def ranking(self, parts: Sequence[int | Message | Job]) -> Ranking:
-        """The numbers of a controller, and of what it meets, in their order."""
+        """The numbers of a machine, and of what it meets, in their order."""
         collected: dict[Kind, set[int]] = {}
         for part in parts:
             for kind, numbers in self._numbers(part).items():
@@ -83,24 +99,18 @@ class Alone(Explorer):
                 numbers.add(self.coordinators.index(kind[2]))
         return Ranking(collected.items(), self.coordinators)
 
-    def kept(self, machine: LocalController | Coordinator, kept: Kept, effects: Sequence[Effect]) -> int:
-        """The number of a machine, of which it is only known whether all that it has told was seen."""
-        if isinstance(machine, LocalController):
-            for above in machine.above.values():
-                above.seen = above.seen if above.seen == above.told else -1
-                above.dismissed = above.dismissed if above.dismissed == above.readiness.sequence else -1
-        return super().kept(machine, kept, effects)
-
     def fired(self, central: Word, effects: Sequence[Effect]) -> Word:
         """Nothing: what the central net holds besides is not known here."""
         del effects
         return central
 
-    def _with(self, number: int, at: Configuration, jobs: frozenset[Job]) -> Configuration:
-        machines = (*at.machines[: self.which], number, *at.machines[self.which + 1 :])
-        return Configuration(machines, frozenset(), jobs, at.budget, at.central)
+    def at(self, number: int, like: Configuration, jobs: frozenset[Job]) -> Configuration:
+        """The configuration in which it is the machine of this number."""
+        machines = (*like.machines[: self.which], number, *like.machines[self.which + 1 :])
+        return Configuration(machines, frozenset(), jobs, self.budget or like.budget, like.central)
 
-    def _spread(self, number: int) -> int:
+    def spread_out(self, number: int) -> int:
+        """The machine with gaps between its numbers."""
         if (known := self.acts.get((number, "spread"))) is None:
             stored = self.machines[number]
             machine = clone(stored.machine)
@@ -109,11 +119,79 @@ class Alone(Explorer):
         return known[0]
 
 
+class Alone(OneMachine):
+    """Explores one controller of a decomposition."""
+
+    def __init__(
+        self,
+        decomposition: Decomposition,
+        name: str,
+        reach: Reach,
+        *,
+        controller: type[LocalController] = LocalController,
+    ) -> None:
+        super().__init__(decomposition, name, controller=controller)
+        self.sensors = tuple(sensor for sensor in self.sensors if self.owner_of[sensor] == self.which)
+        self.surroundings = Surroundings(decomposition, reach)
+        self.focus = frozenset([] if reach.focus is None else [reach.focus])
+
+    def happenings(self, at: Configuration) -> Iterator[tuple[Step, Configuration]]:
+        """Everything that may happen to the controller, and where it leads, with all that it knows."""
+        which, number = self.which, self.spread_out(at.machines[self.which])
+        at = self.at(number, at, at.jobs)
+        machine = self.controller(number)
+        for message in self.surroundings.messages(machine):
+            yield from self._arrives(at, message)
+        yield from self._acts_of(at, which)
+        for last in lasts(machine):
+            yield from self._does(at, "fire", which, last, partial(_fire_behind, last))
+        yield from self._of_cell(at)
+        yield from self._does(at, "repeat", which, None, lambda machine: machine.resend())
+        for above in machine.above.values():
+            if may_be_told_again(machine, above):
+                again, _ = self.act(number, ("told again", above.name), partial(_told_again, above.name))
+                yield Step("told again", -1, None, (), number, again), self.counted(self.at(again, at, at.jobs))
+        if at.budget.crashes:
+            yield self._crashes(at, which, at, number, ())
+
+    def likened(self, number: int) -> Iterator[int]:
+        """The controllers like one: of what it knows of idle rounds, each choice."""
+        idle, kept = self.surroundings.reach.idle, self.machines[number].kept
+        for rounds in forgetting(self.controller(number), kept, idle, self.focus):
+            machine, left = clone(self.controller(number)), dict(kept)
+            forget(machine, left, rounds, self.focus)
+            yield self.kept(machine, left, ())
+
+    def liken(self, machine: LocalController | Coordinator, kept: Kept) -> None:
+        """Take away of a machine what is not told apart behind any act."""
+        super().liken(machine, kept)
+        if isinstance(machine, LocalController):
+            liken(machine, kept)
+
+    def controller(self, number: int) -> LocalController:
+        """A controller, to look at."""
+        machine = self.machine(number)
+        if not isinstance(machine, LocalController):
+            raise TypeError(f"{machine.name!r} is no controller")
+        return machine
+
+
+def _fire_behind(last: int, machine: LocalController) -> list[Effect]:
+    machine.arbiter.last = last
+    return machine.fire()
+
+
+def _told_again(name: str, machine: LocalController) -> list[Effect]:
+    told_again(machine, machine.above[name])
+    return []
+
+
 class _Spread:
     """Puts a gap of three before each number of a round, but before the first of all."""
 
     def __init__(self, coordinators: Sequence[str]) -> None:
         self.coordinators = coordinators
+        self.has_room_before_all = False
 
     def round(self, coordinator: str, number: int) -> int:
         """The number of a round, with room for others before it."""
@@ -122,7 +200,7 @@ class _Spread:
             return number
         begin = number >> EPOCH_BITS << EPOCH_BITS
         begin += (first - begin) % stride
-        return begin + 4 * (number - begin) + (4 * stride if number >> EPOCH_BITS else 0)
+        return begin + 4 * (number - begin) + (4 * stride if number >> EPOCH_BITS or self.has_room_before_all else 0)
 
     def report(self, controller: str, coordinator: str, number: int) -> int:
         """The number of a report."""

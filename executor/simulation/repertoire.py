@@ -156,8 +156,13 @@ class Repertoire:
                 kept.pop(effect.key, None)
             elif isinstance(effect, Keep) and effect.value is not None:
                 kept[effect.key] = effect.value
-        forget_times(machine)
+        self.liken(machine, kept)
         return self._number(machine, kept)
+
+    def liken(self, machine: LocalController | Coordinator, kept: Kept) -> None:
+        """Take away of a machine what is not told apart."""
+        del kept
+        forget_times(machine)
 
     def restored(self, number: int, which: int) -> tuple[int, tuple[Effect, ...]]:
         """What a restart makes of a machine, and its effects."""

@@ -13,6 +13,7 @@ the parametric proof says that it never happens (docs/protocol-invariant.md), wh
 This is the rely of a rely-guarantee argument (Jones, IFIP 1983): that each act of a controller is actions of the proof
 is what the others rely on in turn, and as each act comes after all on which it relies, the circle is none. That a free
 part is voted for only when its commands are taken the proof does not know: whoever explores has to watch that.
+What is left out: a part that only reads is asked for in one round at a time.
 A number of a round is one that the controller knows, or lies in a gap between these: it compares numbers, no more.
 """
 
@@ -37,12 +38,14 @@ Body = tuple[int, tuple[str, ...]] | tuple[int, str | None]
 class Reach:
     """How far what may arrive goes."""
 
-    rounds: int = 1
-    """Of so many rounds a controller knows at once: of those that it promises, or has obeyed and not heard closed."""
+    idle: int = 1
+    """Of so many rounds a controller knows at once that they are over, or that it has promised nothing in them."""
     restarts: int = 0
     """How often each coordinator restarts."""
     leaving: bool = False
     """Whether the controller may be told that no round needs it."""
+    focus: str | None = None
+    """Of which coordinator all may arrive; of the others, or of all, what has to do with promises alone."""
 
 
 class Surroundings:
@@ -57,6 +60,9 @@ class Surroundings:
         """What may arrive at a controller whose numbers leave gaps."""
         name = machine.name
         for above in machine.above.values():
+            if self.reach.focus != above.name:
+                yield from self._beside(machine, above)
+                continue
             for epoch in range(self.reach.restarts + 1):
                 # What says nothing new is said once.
                 is_news = above.seen < above.told and epoch >= above.epoch
@@ -72,6 +78,21 @@ class Surroundings:
                     for seen in seens if self.reach.leaving else [-1] if epoch else []:
                         yield Hello(name, below, seen, epoch, above.name)
 
+    def _beside(self, machine: LocalController, above: Above) -> Iterator[ToController]:
+        """What may arrive of a coordinator of which nothing is known but promises."""
+        first = machine.coordinators.index(above.name)
+        for number, what in dict.fromkeys(self._bodies(machine, above, above.epoch, 0)):
+            if number == first:
+                continue  # as good as any later one, where nothing is closed
+            if isinstance(what, tuple):
+                yield VoteRequest(machine.name, number, what, 0, above.seen, above.epoch, above.name)
+            else:
+                yield Decision(machine.name, number, what, 0, above.seen, above.epoch, above.name)
+        # It has restarted, and has given up some of what it had not decided.
+        promised = sorted(n for n in machine.promises if machine.above_of(n) is above)
+        for below in (0, *(n + len(machine.coordinators) for n in promised)):
+            yield Hello(machine.name, below, -1, above.epoch + 1, above.name)
+
     def _belows(self, machine: LocalController, above: Above, epoch: int) -> list[int]:
         """Below which round all may be said to be closed: nothing new, or more than the controller knows."""
         found = {middle for e in range(epoch + 1) for _, middle, _ in _gaps(machine, above, e)}
@@ -84,17 +105,18 @@ class Surroundings:
 
     def _numbers(self, machine: LocalController, above: Above, epoch: int, below: int) -> list[int]:
         """The rounds that a message may be of: those that are known, and others in every place among them."""
-        known = _rounds(machine, above)
         found = {above.closed_below, above.kept_below}
         for e in range(epoch + 1):
             found.add(_begin(machine, above, e))
             for gap in _gaps(machine, above, e):
                 found |= {*gap} if below in gap else {gap[1]}
-        others = {n for n in {*machine.promises, *machine.closed} if n not in known or n >= below}
-        if len(others) >= self.reach.rounds:
-            found = {n for n in found if n < max(below, above.closed_below)}
         first = machine.coordinators.index(above.name)
-        return sorted(n for n in {*known, *found} if n >= first and _epoch(n) <= epoch)
+        return sorted(n for n in {*_rounds(machine, above), *found} if n >= first and _epoch(n) <= epoch)
+
+    def _promised_again(self, machine: LocalController, number: int) -> set[str]:
+        """The parts that only read, and are promised in another round; any number of rounds could promise them."""
+        promised = {t for n, each in machine.promises.items() if n != number for t in each.promised}
+        return {t for t in promised if not machine.parts[t].writes}
 
     def _bodies(self, machine: LocalController, above: Above, epoch: int, below: int) -> Iterator[Body]:
         for n in self._numbers(machine, above, epoch, below):
@@ -107,7 +129,9 @@ class Surroundings:
                 mine = [t for t in group if t in above.parts]
                 asked = [t for t in mine if t not in machine.free]
                 if _epoch(n) == epoch and n >= below:
-                    yield from ((n, names) for names in _some(asked) if promised <= set(names))
+                    again = self._promised_again(machine, n)
+                    some = (names for names in _some(asked) if promised <= set(names) and again.isdisjoint(names))
+                    yield from ((n, names) for names in some)
                 yield n, None  # an abort, or the answer to a vote of a round that nobody knows
                 if n < below:
                     continue

@@ -18,17 +18,17 @@ from dataclasses import replace
 
 from support.abstraction import Instance, differences, explain, net_structure, play, with_relations
 from support.finite_structures import Structure, Thing
+from support.told_acts import Closed, Held, decided_by, heard_in, met, newest, ordering, said
 
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
-from firable.executor.protocol.deciders import closed_key, coordinators
+from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import (
     Acknowledgement,
     Decision,
     Firing,
     Hello,
     Message,
-    Sending,
     ToController,
     ToCoordinator,
     Vote,
@@ -39,8 +39,6 @@ from firable.executor.simulation.repertoire import Configuration, Step
 from firable.nets.decomposition import Decomposition
 
 Key = tuple[Thing, ...]
-Closed = dict[str, tuple[int, frozenset[int]]]
-"""Of each coordinator, below which round all of its are closed, and which others."""
 
 
 class LocalTie:
@@ -54,28 +52,51 @@ class LocalTie:
         self.coordinators = coordinators(decomposition)
         self.actions: Counter[str] = Counter()
         self.acts: set[object] = set()
+        self.parts = {name: frozenset(t for t, c in self.takes_part if c == name) for _, name in self.takes_part}
+        self.shares: dict[str, Structure] = {}
+        self.decided_shares: dict[frozenset[str], Structure] = {}
+        self.explorer: Explorer | None = None
+        self.held: dict[int, int] = {}
+        """Of each machine of the present explorer, what it holds, by its number among all that was held."""
+        self.holds: dict[Held, int] = {}
 
     def __call__(self, explorer: Explorer, before: Configuration, step: Step, after: Configuration) -> None:
         del after
         if step.machine < 0:
             return  # a message is lost: nobody does anything
+        if explorer is not self.explorer:
+            self.explorer = explorer
+            self.held.clear()
         message = step.about if isinstance(step.about, Message) else None
         asked: tuple[str, ...] = ()
         if isinstance(message, Decision):
             coordinator = explorer.machine(before.machines[explorer.names.index(message.coordinator)])
             assert isinstance(coordinator, Coordinator)
             asked = self._asked(coordinator, message)
-        act = (step.kind, step.machine, step.before, step.after, step.about, asked)
-        if act in self.acts:
-            return
-        self.acts.add(act)
         was, now = explorer.machine(step.before), explorer.machine(step.after)
         if isinstance(was, Coordinator) and isinstance(now, Coordinator):
-            self._coordinator(was, now, step, message)
+            self._standing(was, now, message, is_crash=step.kind.endswith("crash"))
+            act: tuple[object, ...] = (
+                step.kind,
+                *map(decided_by, (was, now)),
+                heard_in(message),
+                ordering(step.effects),
+            )
+            if act not in self.acts:
+                self.acts.add(act)
+                self._coordinator(was, now, step, message)
         elif isinstance(was, LocalController) and isinstance(now, LocalController):
-            kept = [explorer.machines[number].kept for number in (step.before, step.after)]
-            obeyed = [{name: _obeyed(each.get(closed_key(name))) for name in was.above} for each in kept]
-            self._controller(was, now, obeyed[0], obeyed[1], step, message, asked)
+            holds = self._held(explorer, step.before), self._held(explorer, step.after)
+            met_ = met(message) if isinstance(message, ToController) else None
+            act = (step.kind.endswith("crash"), *holds, met_, said(step.effects), asked)
+            if act not in self.acts:
+                self.acts.add(act)
+                self._controller(Held.of(explorer, step.before), Held.of(explorer, step.after), step, message, asked)
+
+    def _held(self, explorer: Explorer, number: int) -> int:
+        if (known := self.held.get(number)) is None:
+            known = self.held[number] = self.holds.setdefault(Held.of(explorer, number), len(self.holds))
+        return known
 
     def _asked(self, coordinator: Coordinator, message: Decision) -> tuple[str, ...]:
         """What the round of a decision had asked of the controller; nothing is known of one that is over."""
@@ -83,48 +104,68 @@ class LocalTie:
         names = opened.transitions if opened is not None else ()
         return tuple(t for t in names if (t, message.controller) in self.takes_part)
 
-    def _told(self, rounds: Iterable[int], **relations: Iterable[Key]) -> Structure:
+    def _structure(self, name: str) -> Structure:
+        """The things and relations of a decomposition as far as a controller has to do with them."""
+        if (known := self.shares.get(name)) is None:
+            whole = self.structure
+            left_out = {t for t in whole.things["Transition"] if (t, name) not in self.takes_part}
+            left_out |= {p for p in whole.things["Place"] if whole.functions["owner"][p] != name}
+            things = {sort: tuple(t for t in those if t not in left_out) for sort, those in whole.things.items()}
+            relations = {
+                relation: frozenset(key for key in keys if left_out.isdisjoint(key))
+                for relation, keys in whole.relations.items()
+            }
+            known = self.shares[name] = replace(whole, things=things, relations=relations)
+        return known
+
+    def _decided_share(self, names: frozenset[str]) -> Structure:
+        """The same as far as the coordinator has to do with transitions: of places it knows nothing."""
+        if (known := self.decided_shares.get(names)) is None:
+            whole = self.structure
+            left_out = {t for t in whole.things["Transition"] if t not in names} | {*whole.things["Place"]}
+            things = {sort: tuple(t for t in those if t not in left_out) for sort, those in whole.things.items()}
+            relations = {
+                relation: frozenset(key for key in keys if left_out.isdisjoint(key))
+                for relation, keys in whole.relations.items()
+            }
+            known = self.decided_shares[names] = replace(whole, things=things, relations=relations)
+        return known
+
+    def _told(self, of: Structure, rounds: Iterable[int], **relations: Iterable[Key]) -> Structure:
         numbers = tuple(sorted(set(rounds)))
-        things = {**self.structure.things, "Round": numbers, "Coordinator": self.coordinators}
+        things = {**of.things, "Round": numbers, "Coordinator": self.coordinators}
         whose: dict[Thing, Thing] = {number: self._whose(number) for number in numbers}
-        functions = {**self.structure.functions, "coordinator-of": whose}
-        return with_relations(replace(self.structure, things=things, functions=functions), **relations)
+        functions = {**of.functions, "coordinator-of": whose}
+        return with_relations(replace(of, things=things, functions=functions), **relations)
 
     def _whose(self, number: int) -> str:
         return self.coordinators[number % len(self.coordinators)]
 
     # --- A controller
 
-    def _controller(
-        self,
-        was: LocalController,
-        now: LocalController,
-        obeyed_before: Closed,
-        obeyed_after: Closed,
-        step: Step,
-        message: Message | None,
-        asked: tuple[str, ...],
-    ) -> None:
-        name = was.name
+    def _controller(self, was: Held, now: Held, step: Step, message: Message | None, asked: tuple[str, ...]) -> None:
+        name, obeyed_before, obeyed_after = was.name, dict(was.obeyed), dict(now.obeyed)
+        closed_before, closed_after = dict(was.closed_below), dict(now.closed_below)
+        promised_before, promised_after = dict(was.promises), dict(now.promises)
         if not step.kind.endswith("crash"):
-            for each, above in now.above.items():
+            for each, closed in closed_after.items():
                 heard = message.closed_below if isinstance(message, ToController) and message.coordinator == each else 0
-                assert above.closed_below == max(was.above[each].closed_below, heard), f"closed at {each}: {step}"
-        below = {each: max(obeyed_before[each][0], obeyed_after[each][0]) for each in was.above}
-        rounds = {*was.promises, *now.promises}
+                assert closed == max(closed_before[each], heard), f"closed at {each}: {step}"
+        below = {each: max(obeyed_before[each][0], obeyed_after[each][0]) for each in closed_before}
+        rounds = {*promised_before, *promised_after}
         rounds |= {r for kept in (obeyed_before, obeyed_after) for _, numbers in kept.values() for r in numbers}
         asked_of: dict[int, set[str]] = {}
-        for machine in (was, now):
-            for number, promise in machine.promises.items():
-                asked_of.setdefault(number, set()).update(promise.promised)
+        for holds in (was, now):
+            for number, promised in holds.promises:
+                asked_of.setdefault(number, set()).update(promised)
         if isinstance(message, VoteRequest):
             asked_of.setdefault(message.round, set()).update(message.transitions)
         if isinstance(message, Decision):
             asked_of.setdefault(message.round, set()).update(asked)
-            asked_of[message.round] |= {message.committed} if message.committed in was.parts else set()
+            asked_of[message.round] |= {message.committed} if message.committed in self.parts[name] else set()
         rounds |= set(asked_of)
         # Below what is closed, a promise that still stands is of a round that a restart of the coordinator gave up.
-        given_up = {number for number in was.promises if number < now.above[self._whose(number)].closed_below}
+        given_up = {number for number in promised_before if number < closed_after[self._whose(number)]}
         asked_keys = [
             (r, t, name)
             for r, names in asked_of.items()
@@ -141,47 +182,42 @@ class LocalTie:
 
         # The vote stands that an order finds, and whatever is told now.
         reports = [] if step.kind.endswith("crash") else [e for e in step.effects if isinstance(e, ToCoordinator)]
-        newest = {
-            each: max(r.readiness.sequence for r in reports if r.coordinator == each)
-            for each in {report.coordinator for report in reports}
-        }
+        last_told = newest(reports)
         voted = {
             (t, name)
             for report in reports
-            if report.readiness.sequence == newest[report.coordinator]
+            if report.readiness.sequence == last_told[report.coordinator]
             for t in report.readiness.transitions
         } & self.free
         earlier = {(t, name) for report in reports for t in report.readiness.transitions} & self.free - voted
         assert earlier <= {key[1:] for key in commit}, f"a vote that does not stand: {step}"
 
-        def told(machine: LocalController, kept: Closed) -> Structure:
+        def told(holds: Held, kept: Closed, voted: set[Key]) -> Structure:
             found = {
                 key[1:] for key in commit if key[1:] in self.free and not _is_over(key[0], kept[self._whose(key[0])])
             }
-            stands = found if machine is was else found | voted
-            marked = [*machine.subnet.names(machine.marking)]
-            marked += [s.name for s in machine.subnet.signals if machine.word & machine.player.signal_bit(s.name)]
-            promised = [(r, t, name) for r, promise in machine.promises.items() for t in promise.promised]
+            promised = [(r, t, name) for r, names in holds.promises for t in names]
             # Obeyed is what outlives a crash. Below what is closed, each round is closed or given up: told as closed.
             over = {r for r in rounds if r < kept[self._whose(r)][0] or r in kept[self._whose(r)][1]}
             obeyed = {key for key in asked_keys if key[0] in over}
             forgotten = {r for r in rounds if r < kept[self._whose(r)][0] and r not in given_up}
-            obeyed |= {(r, t.name, name) for r in forgotten for t in self.net.transitions}
+            obeyed |= {(r, str(t), name) for r in forgotten for t in self.parts[name]}
             return self._told(
+                self._structure(name),
                 rounds,
-                marked=[(each,) for each in marked],
+                marked=[(each,) for each in holds.marked],
                 begun=[(r,) for r in rounds],
                 closed=[(r,) for r in rounds if r < below[self._whose(r)] and r not in given_up],
                 committed=[key[:2] for key in commit],
                 promised=promised,
-                stands=stands,
+                stands=found | voted,
                 obeyed=obeyed,
                 request=request,
                 commit_order=commit,
                 abort_order=abort,
             )
 
-        first, last = told(was, obeyed_before), told(now, obeyed_after)
+        first, last = told(was, obeyed_before, set()), told(now, obeyed_after, set(voted))
         first = self._sending(first, "vote", first.relations["promised"])
         first = self._sending(first, "acknowledgement", first.relations["obeyed"])
         last = self._sending(last, "vote", first.relations["vote"] | last.relations["promised"])
@@ -189,11 +225,13 @@ class LocalTie:
         ordered = frozenset(key for key in fresh if (key[0],) not in first.relations["closed"])
         last = self._sending(last, "acknowledgement", first.relations["acknowledgement"] | ordered)
         # What has been given up is released before anything else is done.
-        released: list[Instance] = [("release", (r, t, name)) for r in given_up for t in was.promises[r].promised]
+        released: list[Instance] = [("release", (r, t, name)) for r in given_up for t in promised_before[r]]
         first = play(first, released)
         self.actions.update(action for action, _ in released)
         fired = [e.transition for e in step.effects if isinstance(e, Firing)]
-        cleared = {name for e in step.effects if isinstance(e, Sending) for name in self.net.place(e.place).cleared}
+        # Who is held after a restart sends no command, and clears its signals all the same.
+        moved = {*fired, *(t for _, t, _ in commit)}
+        cleared = {signal for t, signal in self.structure.relations["clears"] if t in moved}
         places = {place.name for place in self.net.places}
         changed = {key[0] for key in first.relations["marked"] ^ last.relations["marked"]} - places
         held = {key[0] for key in last.relations["marked"]}
@@ -213,8 +251,9 @@ class LocalTie:
         rounds = set(known)
         is_crash = step.kind.endswith("crash")
         asked_keys = [(r, t, c) for r, o in known.items() for t in o.transitions for c in now.participants[t]]
+        asked_of = frozenset(t for opened in known.values() for t in opened.transitions)
         commits = {r: opened.committed for r, opened in known.items()}
-        stands = self._standing(was, now, message, is_crash=is_crash)
+        stands = {key for key in self._standing(was, now, message, is_crash=is_crash) if key[0] in asked_of}
         votes: list[tuple[int, str, str]] = []
         if isinstance(message, Vote) and message.round in rounds:
             votes = [(message.round, t, message.controller) for t in message.promised]
@@ -256,6 +295,7 @@ class LocalTie:
             mine = [key for key in asked_keys if key[0] in begun]
             promising = [key for key in mine if key[1:] not in self.free]
             return self._told(
+                self._decided_share(asked_of),
                 rounds,
                 begun=[(r,) for r in begun],
                 asked=[key[:2] for key in mine],
@@ -280,8 +320,8 @@ class LocalTie:
         if taken_back:
             kept = first.relations["heard"] - taken_back
             first = with_relations(first, heard=kept)
-        both = first.relations["vote"] | last.relations["vote"]
-        first, last = self._sending(first, "vote", both), self._sending(last, "vote", both)
+        # Only what was heard before, or arrives now, may be heard.
+        last = self._sending(last, "vote", first.relations["vote"])
         arrived = first.relations["acknowledgement"]
         last = self._sending(last, "acknowledgement", arrived)
         if step.kind == "crash":
@@ -348,10 +388,3 @@ class LocalTie:
 def _is_over(number: Thing, kept: tuple[int, frozenset[int]]) -> bool:
     """Whether a round is decided, as far as a controller has kept."""
     return isinstance(number, int) and (number < kept[0] or number in kept[1])
-
-
-def _obeyed(kept: object) -> tuple[int, frozenset[int]]:
-    match kept:
-        case [int(below), [*numbers]]:
-            return below, frozenset(int(str(number)) for number in numbers)
-    return 0, frozenset()
