@@ -40,6 +40,8 @@ class Reach:
 
     idle: int = 1
     """Of so many rounds a controller knows at once that they are over, or that it has promised nothing in them."""
+    rounds: int | None = None
+    """Of so many rounds it knows at once that are promised or over; None is of any number."""
     restarts: int = 0
     """How often each coordinator restarts."""
     leaving: bool = False
@@ -110,6 +112,10 @@ class Surroundings:
             found.add(_begin(machine, above, e))
             for gap in _gaps(machine, above, e):
                 found |= {*gap} if below in gap else {gap[1]}
+        known = _rounds(machine, above)
+        others = {n for n in {*machine.promises, *machine.closed} if n not in known or n >= below}
+        if self.reach.rounds is not None and len(others) >= self.reach.rounds:
+            found = {n for n in found if n < max(below, above.closed_below)}
         first = machine.coordinators.index(above.name)
         return sorted(n for n in {*_rounds(machine, above), *found} if n >= first and _epoch(n) <= epoch)
 

@@ -68,6 +68,14 @@ def told(explorer: Explorer, number: int, message: Message | None, reach: Reach)
     stored = explorer.machines[number]
     machine, kept = clone(stored.machine), dict(stored.kept)
     assert isinstance(machine, LocalController)
+    known = {*machine.promises, *machine.closed}
+    if isinstance(message, ToController):
+        over = machine.above[message.coordinator]
+        known = {n for n in known if machine.above_of(n) is not over or n >= message.closed_below}
+        if (n := getattr(message, "round", -1)) >= max(over.closed_below, message.closed_below):
+            known.add(n)
+    if reach.rounds is not None and len(known) > reach.rounds:
+        return None
     if any(above.epoch > reach.restarts for above in machine.above.values()):
         return None
     liken(machine, kept)
@@ -137,7 +145,7 @@ def alone(decomposition: Decomposition, reach: Reach, budget: Budget) -> Acts:
     ],
 )
 def test_whatever_controllers_do_among_all_machines_they_do_alone(name: str, faults: Budget) -> None:
-    decomposition, reach = decomposition_of(name), Reach(focus=TOP)
+    decomposition, reach = decomposition_of(name), Reach(rounds=1, focus=TOP)
     among_all = Acts(reach, 0)
     assert explore(Explorer(decomposition), faults, max_configurations=30_000, watch=among_all).complete
     contained(among_all, alone(decomposition, reach, Budget()))
@@ -146,7 +154,7 @@ def test_whatever_controllers_do_among_all_machines_they_do_alone(name: str, fau
 
 @pytest.mark.seeds
 def test_whatever_controllers_do_around_a_crash_they_do_alone() -> None:
-    decomposition, reach = decomposition_of("remote_gate"), Reach(focus=TOP)
+    decomposition, reach = decomposition_of("remote_gate"), Reach(rounds=1, focus=TOP)
     among_all = Acts(reach, 1)
     explore(Explorer(decomposition), CRASH, max_configurations=2000 * FACTOR, watch=among_all)
     contained(among_all, alone(decomposition, reach, CRASH))
@@ -154,7 +162,7 @@ def test_whatever_controllers_do_around_a_crash_they_do_alone() -> None:
 
 def test_of_the_cell_every_act_is_some_actions_of_the_proof_whatever_arrives_and_those_on_ways_are_among_them() -> None:
     """Of the system controller, with parts free of promise as bundles have them: all that there is."""
-    decomposition, reach = decomposition_of("free one_robot"), Reach(focus=TOP)
+    decomposition, reach = decomposition_of("free one_robot"), Reach(rounds=1, focus=TOP)
     by_itself, among_all, tie = Acts(reach, 0), Acts(reach, 0), Tie(decomposition)
 
     def watch(explorer: Explorer, at: Configuration, step: Step, after: Configuration) -> None:
