@@ -5,7 +5,8 @@ the others than messages, and `surroundings` says which may arrive in whatever i
 on its own, with its machines of the cell, its sensors and its stable storage; any number of messages is lost, doubled
 and late. A controller that mostly votes comes to an end after some hundred configurations, one with many steps of its
 own after thousands, or not in minutes. Where it ends, what the controller does in any run of the cell it does here, as
-far as `Reach` and the budget of its own crashes go.
+far as `Reach` and the budget of its own crashes go, and but for what `likeness` does not tell apart: that what is
+closed has nothing to do with the rest is argued there and tested, not proved.
 
 Numbers are counted from the beginning as in the exploration of all machines, and then with gaps between them, so that
 there are numbers for what arrives. Zero is not moved: it is where a controller begins that has heard of nothing, and

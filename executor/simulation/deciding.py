@@ -6,10 +6,11 @@ message says that a round is closed which is not, and whose end is awaited is ne
 explored on its own, to the end, with `hearing` for what may arrive, any number of restarts with what stable storage
 holds, and rounds given up at any time; and what else there is (`Setting`) is put before each act and taken away behind
 it: whom everybody has hinted at, so that rounds are opened, and a round of each other group, in each of its stages,
-older or newer. What a coordinator does in any run of the cell it does here, to one group after the other, beside one
-other round at a time.
+older or newer. That what a coordinator does in any run of the cell it does here, to one group after the other, rests
+on two things that are not proved: that groups have nothing else to do with each other, and that one other round at a
+time is as good as several.
 
-That groups have nothing else to do with each other is checked, act by act, on the code itself:
+The first is checked at acts, on the code itself, each in one setting and not in all:
 
 - an act about the group leaves a round beside it as it was, and does to the group what it does without that round, or
   what it does when nothing is opened;

@@ -1,9 +1,10 @@
 """What of a controller alone is not told apart: the quotient that lets its exploration end.
 
 A controller alone is in the widest surroundings, where whatever may happen is tried. So what it remembers need not be
-told apart where every value of it is tried anyway, or where no act reads it. Each line below takes only differences
-away that other configurations have as well: whatever a controller may do, it does in the configuration it is like.
-That is a quotient by an abstraction that only adds runs (Clarke, Grumberg and Long, TOPLAS 1994), of the code itself.
+told apart where every value of it is tried anyway, or where no act reads it. Each line below but the last two takes
+only differences away that other configurations have as well: whatever a controller may do, it does in the
+configuration it is like. That is meant to be a quotient by an abstraction that only adds runs (Clarke, Grumberg and
+Long, TOPLAS 1994), of the code itself; it is argued here, line by line, and proved nowhere.
 
 - *Whose turn it is*: which local transition fired last only shares out turns. It is forgotten, and `fire` is tried
   behind each of them (`lasts`).
