@@ -98,8 +98,9 @@ simulate: $(MADE)/develop ## the executor through faults, RUNS seeds on each cel
 	@set -e; for net in $(REHEARSED); do \
 		$(BIN)/firable rehearse $$net --seeds $(RUNS) --from $(FROM) --jobs $(JOBS); done
 
-explore: $(MADE)/develop ## the machines of the cells, each alone, held to the proof as far as they end; CELLS names some
+explore: $(MADE)/develop ## the machines of the cells, each alone, held to the proof, those that end; CELLS names some
 	$(BIN)/python tests/explore_cells.py $(CELLS)
+	$(BIN)/pytest -n 0 tests/explore_alone.py
 
 mutants: $(MADE)/mutants ## which wrong edits of FILE the tests in TESTS do not notice
 	@test -n "$(FILE)" -a -n "$(TESTS)" || { echo "make mutants FILE=semantics/firing.py TESTS=tests/semantics"; exit 2; }

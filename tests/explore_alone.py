@@ -9,9 +9,11 @@ from __future__ import annotations
 
 from support.alone_acts import Acts, alone, contained, decomposition_of, group_of
 from support.examples import FACTOR, FIRST_SEED
+from support.local_net_tie import LocalNetTie
 from support.local_tie import LocalTie
 from support.standing_votes import AloneTie
 
+from firable.decompose.protocol.building import protocol_net
 from firable.executor.protocol.deciders import TOP
 from firable.executor.simulation.alone import Alone
 from firable.executor.simulation.deciding import Deciding
@@ -20,6 +22,28 @@ from firable.executor.simulation.repertoire import Budget, Configuration, Step
 from firable.executor.simulation.surroundings import Reach
 
 CRASH = Budget(crashes=1)
+
+
+def test_whatever_controllers_do_where_a_gate_is_read_again_they_do_alone() -> None:
+    decomposition, reach = decomposition_of("gate_read_again"), Reach(rounds=1, focus=TOP)
+    among_all = Acts(reach, 0)
+    assert explore(Explorer(decomposition), Budget(losses=1), max_configurations=30_000, watch=among_all).complete
+    contained(among_all, alone(decomposition, reach, Budget()))
+    assert among_all.beyond == 0
+
+
+def test_with_parts_that_promise_every_act_is_what_was_proved_and_all_there_is_is_explored() -> None:
+    """Of the machining centre of `two_robots_shared`, but for what is closed, with any number of restarts."""
+    decomposition = decomposition_of("two_robots_shared")
+    tie, net_tie = AloneTie(decomposition), LocalNetTie(protocol_net(decomposition))
+
+    def watch(explorer: Explorer, at: Configuration, step: Step, after: Configuration) -> None:
+        tie(explorer, at, step, after)
+        net_tie(explorer, at, step, after)
+
+    assert explore(Alone(decomposition, "mc", Reach()), CRASH, watch=watch).complete
+    assert tie.actions["promise"] > 0
+    assert net_tie.kinds["apply"] > 0
 
 
 def test_whatever_controllers_do_around_a_crash_they_do_alone() -> None:

@@ -54,7 +54,7 @@ class Setting:
 
 
 NOTHING_ELSE: Final = Setting()
-T = TypeVar("T", Report, Vote, Acknowledgement)
+T = TypeVar("T", bound=ToCoordinator)
 
 
 class Hearing:
