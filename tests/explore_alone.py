@@ -24,14 +24,6 @@ from firable.executor.simulation.surroundings import Reach
 CRASH = Budget(crashes=1)
 
 
-def test_whatever_controllers_do_where_a_gate_is_read_again_they_do_alone() -> None:
-    decomposition, reach = decomposition_of("gate_read_again"), Reach(rounds=1, focus=TOP)
-    among_all = Acts(reach, 0)
-    assert explore(Explorer(decomposition), Budget(losses=1), max_configurations=30_000, watch=among_all).complete
-    contained(among_all, alone(decomposition, reach, Budget()))
-    assert among_all.beyond == 0
-
-
 def test_with_parts_that_promise_every_act_is_what_was_proved_and_all_there_is_is_explored() -> None:
     """Of the machining centre of `two_robots_shared`, but for what is closed, with any number of restarts."""
     decomposition = decomposition_of("two_robots_shared")

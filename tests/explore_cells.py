@@ -10,7 +10,7 @@ group, the net says nothing, and the acts are counted in the line of the machine
 `ENDS` names what is known to end. Each of these must end within its bound; else, or where an act is none of the
 proof's, the exit status is 1. All other machines of the cells are named and not explored: nothing is claimed of them.
 
-It is no test of the suite, as it takes many minutes on one processor; the quick ones are (`test_alone.py`).
+It is no test of the suite, as it takes some minutes on one processor; the quick ones are (`test_alone.py`).
 """
 
 from __future__ import annotations

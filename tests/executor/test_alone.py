@@ -44,6 +44,7 @@ CRASH = Budget(crashes=1)
     [
         ("remote_gate", Budget(losses=1, copies=1)),
         ("local_conflict", Budget(losses=1)),
+        ("gate_read_again", Budget(losses=1)),
         ("free ring", Budget()),
     ],
 )
