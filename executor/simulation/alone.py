@@ -17,6 +17,7 @@ pairs are of two different times of the cell, and what a machine does with an or
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from functools import partial
 
@@ -40,7 +41,7 @@ from firable.executor.simulation.surroundings import Reach, Surroundings
 from firable.nets.decomposition import Decomposition
 
 
-class OneMachine(Explorer):
+class OneMachine(Explorer, ABC):
     """Explores one machine of a decomposition; the other machines of its configurations are those of the start."""
 
     def __init__(
@@ -67,13 +68,15 @@ class OneMachine(Explorer):
             for left in known:
                 yield step, after if left == number else self.counted(self.at(left, after, after.jobs))
 
+    @abstractmethod
     def happenings(self, at: Configuration) -> Iterator[tuple[Step, Configuration]]:
         """Everything that may happen to the machine, and where it leads, with all that the machine knows."""
-        raise NotImplementedError
+        ...
 
+    @abstractmethod
     def likened(self, number: int) -> Iterator[int]:
         """The machines like one, which know less."""
-        raise NotImplementedError
+        ...
 
     def initial(self, budget: Budget) -> Configuration:
         """The machine started for the first time; of what it may suffer once it may suffer any number."""
