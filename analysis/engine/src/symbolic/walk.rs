@@ -25,6 +25,7 @@ use super::events::{Kind, Sense, literals};
 use super::space::{Events, Symbolic};
 use super::zdd::{EMPTY, Node, Store, TERMINAL};
 use crate::budget::{Stop, Watch};
+use crate::marking::words_for;
 use crate::net::Net;
 use crate::stubborn::dependencies::Dependencies;
 use crate::stubborn::walk::{Target, walk};
@@ -37,6 +38,8 @@ const IN_VAIN: u64 = 8;
 /// The firings that are drawn at random, all together, and how many deadlocks that are no targets they may end in.
 const DRAWN_MAX: u64 = 1 << 22;
 const OTHERS_MAX: u64 = 1 << 8;
+/// The part of the memory that the masks of the net may take for them.
+const MASKS_SHARE: usize = 8;
 /// The markings that one search for a way out of a hollow may look at.
 const HOLLOW_MAX: usize = 20_000;
 
@@ -152,7 +155,20 @@ impl Symbolic {
     }
 
     /// A sequence of firings that are drawn, if it comes to one of these deadlocks soon.
+    ///
+    /// Not where the masks of the net take more than a part of the memory: a diagram holds nets of any width.
     fn at_random(&mut self, targets: Node, moves: &Moves, watch: &mut Watch<'_>) -> Result<Option<Walk>, Stop> {
+        let masks = size_of::<u64>() * words_for(self.level_of().len()) * self.transitions.len();
+        let memory = &self.diagram().store.memory;
+        if masks > memory.limit() / MASKS_SHARE || memory.claim(masks).is_err() {
+            return Ok(None);
+        }
+        let found = self.drawn(targets, moves, watch);
+        self.diagram().store.memory.release(masks);
+        found
+    }
+
+    fn drawn(&mut self, targets: Node, moves: &Moves, watch: &mut Watch<'_>) -> Result<Option<Walk>, Stop> {
         let net = Net::new(self.level_of().len(), self.transitions.clone(), &self.initial);
         let net = net.expect("a net that was explored is well formed");
         let dependencies = Dependencies::new(&net);
@@ -399,6 +415,11 @@ mod tests {
             let walk = space.at_random(wanted, &moves, &mut watch).expect("enough room").expect("it is near");
             assert_eq!((walk.reached, walk.shortest), (vec![end], false));
         }
+        // In less memory than eight times the masks nothing is drawn; what is near in layers is found without.
+        let wanted = space.single(&[], &[2]).expect("enough room");
+        space.diagram().store.memory.allow(8 * 8 * 5 - 1);
+        assert_eq!(space.at_random(wanted, &moves, &mut watch), Ok(None));
+        space.diagram().store.memory.allow(bytes);
         let elsewhere = space.single(&[], &[0]).expect("enough room");
         assert_eq!(space.at_random(elsewhere, &moves, &mut watch), Ok(None));
     }
