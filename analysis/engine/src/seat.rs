@@ -9,7 +9,7 @@
 //! divide by a variable).
 
 use bytemuck::Pod;
-use wide::{CmpEq, i32x8};
+use wide::{CmpEq, i32x4};
 
 use crate::budget::Stop;
 
@@ -36,6 +36,17 @@ pub trait Slot: Pod + Eq + Send + Sync {
     fn get(self) -> u64;
     /// A bit for each slot of a bucket that has a value.
     fn matches(bucket: &[Self; LANES], value: Self) -> u32;
+    /// Whether some slot of a bucket has a value. What a look-up asks once for each edge, so both halves of the bucket are
+    /// joined before anything is made of them.
+    fn holds(bucket: &[Self; LANES], value: Self) -> bool;
+}
+
+/// What the four lanes of both halves of a bucket compare to.
+#[inline(always)]
+fn compared(bucket: &[u32; LANES], value: u32) -> [i32x4; 2] {
+    // By name: whether a compiler sees these vector instructions in a loop over the eight depends on its version.
+    let halves: [i32x4; 2] = bytemuck::cast(*bucket);
+    halves.map(|half| half.cmp_eq(i32x4::splat(value as i32)))
 }
 
 impl Slot for u32 {
@@ -51,8 +62,14 @@ impl Slot for u32 {
 
     #[inline(always)]
     fn matches(bucket: &[u32; LANES], value: u32) -> u32 {
-        // By name: whether a compiler sees these vector instructions in a loop over the eight depends on its version.
-        i32x8::new(bytemuck::cast(*bucket)).cmp_eq(i32x8::splat(value as i32)).move_mask() as u32
+        let [low, high] = compared(bucket, value);
+        (low.move_mask() | high.move_mask() << 4) as u32
+    }
+
+    #[inline(always)]
+    fn holds(bucket: &[u32; LANES], value: u32) -> bool {
+        let [low, high] = compared(bucket, value);
+        (low | high).move_mask() != 0
     }
 }
 
@@ -72,6 +89,15 @@ impl Slot for u64 {
         let low: [u32; LANES] = bucket.map(|slot| slot as u32);
         let high: [u32; LANES] = bucket.map(|slot| (slot >> 32) as u32);
         u32::matches(&low, value as u32) & u32::matches(&high, (value >> 32) as u32)
+    }
+
+    #[inline(always)]
+    fn holds(bucket: &[u64; LANES], value: u64) -> bool {
+        let low: [u32; LANES] = bucket.map(|slot| slot as u32);
+        let high: [u32; LANES] = bucket.map(|slot| (slot >> 32) as u32);
+        let [a, b] = compared(&low, value as u32);
+        let [c, d] = compared(&high, (value >> 32) as u32);
+        (a & c | b & d).move_mask() != 0
     }
 }
 
@@ -220,8 +246,17 @@ mod tests {
         let values = [7_u64, 1 << 40 | 7, 7, 0, 1 << 40, 7 << 32, 9, 7];
         for (value, expected) in [(7, 0b1000_0101), (1 << 40 | 7, 0b10), (0, 0b1000), (8, 0)] {
             assert_eq!(u64::matches(&values, value), expected);
+            assert_eq!(u64::holds(&values, value), expected != 0);
         }
         assert_eq!(u32::matches(&values.map(|value| value as u32), 7), 0b1000_0111);
+        for lane in 0..LANES {
+            let one: [u32; LANES] = std::array::from_fn(|at| if at == lane { 9 } else { 8 });
+            assert!(u32::matches(&one, 9) == 1 << lane && u32::holds(&one, 9) && !u32::holds(&one, 7));
+            let wide = one.map(|slot| u64::from(slot) << 32 | 5);
+            assert!(
+                u64::holds(&wide, 9 << 32 | 5) && !u64::holds(&wide, 9 << 32 | 6) && !u64::holds(&wide, 7 << 32 | 5)
+            );
+        }
         assert_eq!(u32::matches(&[u32::MAX; LANES], u32::MAX), 0b1111_1111);
     }
 }
