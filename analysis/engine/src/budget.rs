@@ -179,6 +179,11 @@ impl<'a> Watch<'a> {
         Watch { deadline, poll, since_clock: 0, before_first: Some(FIRST_POLL), polled: Instant::now(), found }
     }
 
+    /// When time is over.
+    pub(crate) fn deadline(&self) -> Option<Instant> {
+        self.deadline
+    }
+
     /// Reports work done: markings expanded and edges followed, some nanoseconds each.
     #[inline]
     pub fn tick(&mut self, work: usize) -> Result<(), Stop> {

@@ -22,8 +22,8 @@
 //! where a bucket is full (one more miss for one edge in six; the next bucket is at hand); to fill seven eighths (more keys
 //! stand elsewhere, and exploring takes a tenth longer).
 
-pub(crate) mod halves;
 mod in_place;
+mod sides;
 
 use std::ops::Range;
 
@@ -252,7 +252,7 @@ impl<S: Slot> Exact<S> {
     /// number, which may refuse it. `done` are dealt with: fewer than `open` where one is refused, or where all buckets are
     /// full that would be tried for it.
     #[inline(always)]
-    fn insert(
+    pub(crate) fn insert(
         &mut self,
         asked: &Asked<S>,
         done: &mut usize,
@@ -294,10 +294,30 @@ impl<S: Slot> Exact<S> {
             if *done == open {
                 return Ok(());
             }
-            let before = self.shape;
-            self.grow(memory, watch)?;
-            self.ask_again(asked, before);
+            self.grow_asked(asked, memory, watch)?;
         }
+    }
+
+    /// Takes more buckets, and asks again.
+    #[cold]
+    pub(crate) fn grow_asked(
+        &mut self,
+        asked: &mut Asked<S>,
+        memory: &Memory,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), Stop> {
+        let before = self.shape;
+        self.grow(memory, watch)?;
+        self.ask_again(asked, before);
+        Ok(())
+    }
+
+    /// The key of one that `first_look` has left open.
+    #[cold]
+    pub(crate) fn asked_key(&self, asked: &Asked<S>, open: usize) -> u64 {
+        let c = usize::from(asked.open[open % ROOM]);
+        let mixed = self.shape.mixed(asked.homes[c] as usize, asked.wanted[c].get());
+        self.shape.unmixed(mixed >> (64 - self.shape.bits))
     }
 
     /// Empties what was asked, and takes more buckets if as many new keys again would make the table more than four
@@ -305,22 +325,32 @@ impl<S: Slot> Exact<S> {
     #[inline(always)]
     pub fn answered(&mut self, asked: &mut Asked<S>, memory: &Memory, watch: &mut Watch<'_>) -> Result<(), Stop> {
         asked.count = 0;
-        while 5 * (self.len + ROOM) > 4 * LANES * self.shape.buckets as usize {
+        while Self::is_filled(self.shape, self.len) {
             self.grow(memory, watch)?;
         }
         Ok(())
     }
 
+    /// Whether as many new keys as are asked for at once would make a table of so many more than four fifths full.
+    #[inline(always)]
+    fn is_filled(shape: Shape, len: usize) -> bool {
+        5 * (len + ROOM) > 4 * LANES * shape.buckets as usize
+    }
+
     /// Takes more buckets. Where that ends early, for want of memory or of time, all keys are where they were.
     #[cold]
     pub fn grow(&mut self, memory: &Memory, watch: &mut Watch<'_>) -> Result<(), Stop> {
-        let mut shape = self.shape;
+        self.grow_beyond(self.shape, memory, watch)
+    }
+
+    /// Takes more buckets than that.
+    fn grow_beyond(&mut self, mut shape: Shape, memory: &Memory, watch: &mut Watch<'_>) -> Result<(), Stop> {
         loop {
             shape = shape.roomier()?;
             let mut room = Self::room(shape, memory)?;
             let buckets = room.all_mut().as_chunks_mut().0;
             let filled = memory.filled(0, buckets.len()).and_then(|mut taken| {
-                let filled = self.refill(shape, Filling::new(buckets, &mut taken), watch);
+                let filled = self.refill(shape, Filling::new(buckets, &mut taken), watch, |_| true);
                 memory.release(taken.len());
                 filled
             });
@@ -334,17 +364,24 @@ impl<S: Slot> Exact<S> {
         }
     }
 
-    /// Puts all keys into other buckets; false where some of them are full. That ends with as many buckets as keep any
-    /// eight keys apart, if not with memory.
-    fn refill(&self, shape: Shape, mut filling: Filling<'_, S>, watch: &mut Watch<'_>) -> Result<bool, Stop> {
+    /// Puts all keys, or those of whose mixed keys that is said, into other buckets; false where some of them are full. That
+    /// ends with as many buckets as keep any eight keys apart, if not with memory.
+    fn refill(
+        &self,
+        shape: Shape,
+        mut filling: Filling<'_, S>,
+        watch: &mut Watch<'_>,
+        mut is_wanted: impl FnMut(u64) -> bool,
+    ) -> Result<bool, Stop> {
         let mut moving = Moving::new();
         let mut fits = true;
         for (at, bucket) in self.buckets().iter().enumerate() {
             watch.tick(LANES)?;
             moving.take(self.shape, at, bucket, 0..usize::MAX);
             moving.leave(at + 1 == self.buckets().len(), |product| {
-                let (home, wanted) = shape.seat_of(self.shape.key_of(product));
-                fits &= filling.take(home, wanted);
+                let key = self.shape.key_of(product);
+                let (home, wanted) = shape.seat_of(key);
+                fits &= !is_wanted(key) || filling.take(home, wanted);
             });
             if !fits {
                 return Ok(false);

@@ -22,7 +22,7 @@ use crate::budget::{Found, Memory, Stop, Watch};
 use crate::known::{Arrivals, ByKey, Hashed, Set};
 use crate::marking::{Dynamic, Width, holds};
 use crate::net::{Net, Rules};
-use crate::pair::{LEVEL_LEAST, Pair, Shared};
+use crate::pair::{MEASURED, Pair, Shared};
 use crate::step::{Components, Steps};
 use crate::table::{NONE, Table};
 use crate::with_width;
@@ -88,7 +88,7 @@ impl Space {
         limits: Limits,
         poll: &mut dyn FnMut(Found) -> Result<(), Stop>,
     ) -> Result<Self, Stop> {
-        let pair = two.map(|free| Pair::new(&net, LEVEL_LEAST, free));
+        let pair = two.map(|free| Pair::new(&net, MEASURED, free));
         Space::explore_with(pair, net, limits, poll)
     }
 
@@ -166,7 +166,10 @@ impl Space {
                 Set::Wide(keyed) => self.run_interleaving(width, &net, &mut ByKey::new(keyed), pair, max, watch),
             };
             self.set = set;
-            pair.take().map_or(Ok(()), |pair| pair.finish(self)).and(result)
+            if let Some(pair) = pair.take() {
+                pair.finish(self);
+            }
+            result
         }
     }
 
@@ -197,7 +200,7 @@ impl Space {
         let (mut next, mut end) = (0, 1);
         while self.level_end(next, &mut end)? {
             let open;
-            (open, end) = match pair.as_mut().filter(|pair| pair.takes(end - next)) {
+            (open, end) = match pair.as_mut().filter(|pair| pair.takes(end - next, end)) {
                 Some(pair) => pair.expand(width, self, arrivals, next, max, watch)?,
                 None => (vec![(next, end)], end),
             };

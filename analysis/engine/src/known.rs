@@ -20,6 +20,7 @@ use crate::exact::{Asked, Exact, ROOM};
 use crate::indexes::Indexes;
 use crate::marking::{Width, linear_hash};
 use crate::net::Net;
+use crate::pair::Sides;
 use crate::seat::Slot;
 use crate::span::Span;
 use crate::spread::Spread;
@@ -163,12 +164,14 @@ pub struct ByKey<'a, S> {
     pub(crate) asked: Asked<S>,
     /// The marking of the batch (low six bits) and the transition that made each.
     made: [u32; ROOM],
+    /// While two threads explore, the side of each.
+    pub(crate) sides: Option<Sides<S>>,
 }
 
 impl<'a, S: Slot> ByKey<'a, S> {
     /// None yet.
     pub fn new(keyed: &'a mut Keyed<S>) -> Self {
-        ByKey { keyed, asked: Asked::new(), made: [0; ROOM] }
+        ByKey { keyed, asked: Asked::new(), made: [0; ROOM], sides: None }
     }
 
     /// Looks up what came, and appends what is new.

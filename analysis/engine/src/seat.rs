@@ -19,7 +19,7 @@ pub const LANES: usize = 8;
 pub(crate) const MOVED_BITS: u32 = 6;
 /// Buckets that are tried for a key.
 pub(crate) const REACH: usize = (1 << MOVED_BITS) - 1;
-/// Most buckets: their numbers are kept in 32 bits (`exact.rs`, `halves.rs`), and one cut short would take two keys for
+/// Most buckets: their numbers are kept in 32 bits (`exact.rs`), and one cut short would take two keys for
 /// one.
 const BUCKETS_MAX: u64 = 1 << 32;
 /// A table of fewer buckets doubles: what it takes is little beside all else, and to move its keys as often as those of a
@@ -27,6 +27,17 @@ const BUCKETS_MAX: u64 = 1 << 32;
 const DOUBLES_BELOW: u64 = 1 << 16;
 /// Odd, so that the product is a bijection (the golden ratio).
 pub(crate) const FACTOR: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// The factor that takes `FACTOR` back.
+const INVERSE: u64 = {
+    // Newton's iteration: an odd number is its own inverse in three bits, and each step doubles those that are right.
+    let (mut inverse, mut step) = (FACTOR, 0);
+    while step < 5 {
+        inverse = inverse.wrapping_mul(2_u64.wrapping_sub(FACTOR.wrapping_mul(inverse)));
+        step += 1;
+    }
+    inverse
+};
 
 /// A slot: 32 or 64 bits.
 pub trait Slot: Pod + Eq + Send + Sync {
@@ -150,6 +161,11 @@ impl Shape {
         key.wrapping_mul(self.factor)
     }
 
+    /// The key of a mixed key that stands in the low bits of a word.
+    pub(crate) fn unmixed(self, mixed: u64) -> u64 {
+        mixed.wrapping_mul(INVERSE) & ((1 << self.bits) - 1)
+    }
+
     /// The bucket of a mixed key, and its slot there. Keys of one bucket differ, in the low half of the product, by
     /// multiples of the number of buckets, so what the power of two below that number spans can be left off.
     #[inline(always)]
@@ -258,5 +274,15 @@ mod tests {
             );
         }
         assert_eq!(u32::matches(&[u32::MAX; LANES], u32::MAX), 0b1111_1111);
+    }
+
+    #[test]
+    fn a_mixed_key_gives_its_key_back() {
+        for bits in [16, 33, 60] {
+            let shape = Shape::new(bits, 3, 7);
+            for key in (0..1000_u64).map(|i| i.wrapping_mul(FACTOR) >> (64 - bits)) {
+                assert_eq!(shape.unmixed(shape.mix(key) >> (64 - bits)), key);
+            }
+        }
     }
 }

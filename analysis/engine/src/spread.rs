@@ -78,11 +78,6 @@ impl Spread {
         spread
     }
 
-    /// Words of a marking.
-    pub(crate) fn words(&self) -> usize {
-        self.base.len()
-    }
-
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
         8 * (self.sums.len() + self.base.len())

@@ -1,7 +1,7 @@
-//! What the two threads of a pair share out: a set of markings in two halves, by the highest bit of the mixed key or hash.
+//! What the two threads of a pair share out: a set of markings in two halves.
 //!
-//! A candidate goes from thread to thread as a *record* of a few words, which says where it belongs and what it is. Which
-//! words these are is the set's affair: the place of a key (`keyed.rs`), or a hash with a marking (`hashed.rs`).
+//! A candidate goes from thread to thread as a *record* of a few words, which says what it is and where it belongs. Which
+//! words these are is the set's affair: a key (`keyed.rs`), or a hash with a marking (`hashed.rs`).
 
 use crate::batch::Batch;
 use crate::budget::{Memory, Stop, Watch};
@@ -43,8 +43,6 @@ pub(crate) struct Finds {
     /// What found no place, as `Shared::insert_left` takes it, and how much of it for good.
     pub(crate) left: Vec<u64>,
     strays: usize,
-    /// Keys of the markings that stand past the end of its half of a set of keys.
-    pub(crate) past: Vec<u64>,
     /// Why it must end.
     pub(crate) end: Option<End>,
 }
@@ -60,7 +58,6 @@ impl Finds {
             most: 0,
             left: Vec::new(),
             strays: 0,
-            past: Vec::new(),
             end: None,
         }
     }
@@ -71,13 +68,22 @@ impl Finds {
         self.memory.allow(held + bytes);
         (self.most, self.strays, self.end) = (markings, 0, None);
         self.levels.clear();
-        self.past.clear();
     }
 
     /// Ends for a reason, if not for one more urgent.
     #[cold]
     pub(crate) fn end(&mut self, end: End) {
         self.end = self.end.max(Some(end));
+    }
+
+    /// Ends because there is no room, or no time, for what is found; it takes nothing more.
+    #[cold]
+    pub(crate) fn close(&mut self, stop: Stop) {
+        self.most = self.fresh.len();
+        self.end(match stop {
+            Stop::Markings | Stop::Memory => End::Short,
+            stop => End::Stopped(stop),
+        });
     }
 
     /// Keeps what finds no place in the half.
@@ -91,23 +97,40 @@ impl Finds {
     }
 }
 
+/// Where candidates go: what is new to the finds, what is the other's to the end of his records, of which so many words are
+/// used.
+pub(crate) struct To<'a, 'b> {
+    pub(crate) finds: &'a mut Finds,
+    pub(crate) theirs: (&'a mut [u64], &'a mut usize),
+    pub(crate) watch: &'a mut Watch<'b>,
+}
+
 /// A half of a set, in the hands of its thread.
 pub(crate) trait Half<W: Width>: Send {
+    /// Makes what the thread works on, of memory of its finds.
+    fn begin(&mut self, memory: &Memory, watch: &mut Watch<'_>) -> Result<(), Stop>;
+
     /// The words of a record.
     fn stride(&self, width: W) -> usize;
 
     /// Slices a batch, with what its records need.
-    fn cut(&self, width: W, batch: &mut Batch);
+    fn cut(&mut self, width: W, batch: &mut Batch);
 
-    /// Takes the markings that a transition makes of each of `fire`. Those of this half wait in it, the records of the
-    /// others stand in `theirs` up to `len`: written to both places and counted in one, because which, no processor guesses.
-    fn push(&mut self, width: W, net: &Net, batch: &Batch, t: usize, fire: u64, theirs: (&mut [u64], &mut usize));
+    /// Takes the markings that a transition makes of each of `fire`. Those of this half go into it, or wait; the records of
+    /// the others are written to `to.theirs`, which has room for all and one more.
+    fn push(&mut self, width: W, net: &Net, batch: &Batch, t: usize, fire: u64, to: To<'_, '_>);
 
-    /// Puts into the half what waits in it, if it is much or if `all` is to be there; new markings go to the finds.
-    fn settle(&mut self, width: W, all: bool, finds: &mut Finds);
+    /// Ends a batch, and with it a round or not: then nothing may wait any more.
+    fn end(&mut self, width: W, net: &Net, batch: &Batch, round: bool, to: To<'_, '_>);
 
-    /// The same with records that came from the other half.
-    fn insert(&mut self, width: W, records: &[u64], finds: &mut Finds);
+    /// Whether it will soon take more room, or could as well take it now, where the other one does.
+    fn wants_room(&self, other_does: bool) -> bool;
+
+    /// Takes more room, if there is memory for that.
+    fn take_room(&mut self, finds: &mut Finds, watch: &mut Watch<'_>);
+
+    /// Puts records that came from the other half into this one; new markings go to the finds.
+    fn insert(&mut self, width: W, records: &[u64], finds: &mut Finds, watch: &mut Watch<'_>);
 }
 
 /// A set that can be halved.
@@ -120,12 +143,18 @@ pub(crate) trait Shared<W: Width>: Arrivals<W> {
     /// Whether the threads may go on to the next level with what they found: where the set says no indexes.
     const GOES_ON: bool;
 
+    /// Says how the set is cut for a level that ends at an index; false where more than that part of two threads' time would be
+    /// lost.
+    fn cut(&mut self, width: W, space: &Space, end: usize, loss_most: f64) -> bool;
+
     /// The array of markings, and the two halves.
     fn halves<'a>(&'a mut self, table: &'a mut Table) -> (&'a Store, [Self::Half<'a>; 2]);
 
     /// Makes the set say all that was found, by the indexes that the markings are about to get in the array: in each level
     /// in turn `BLOCK` of each thread, as long as both have them, then what one and the other have more.
-    fn complete(&mut self, width: W, space: &mut Space, finds: [&Finds; 2], watch: &mut Watch<'_>) -> Result<(), Stop>;
+    /// Of memory of the finds nothing is held by the set any more. After an error it holds what it held before, or needs
+    /// `forget_others`.
+    fn complete(&mut self, width: W, space: &mut Space, finds: [&Finds; 2]) -> Result<(), Stop>;
 
     /// Makes room for more; false where there is no memory for that. After an error a set of hashes cannot be used any
     /// more; one of keys has lost none.

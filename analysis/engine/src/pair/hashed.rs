@@ -7,10 +7,10 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
-use super::half::{BLOCK, End, Finds, Half, Shared};
+use super::half::{BLOCK, End, Finds, Half, Shared, To};
 use crate::apart::Apart;
 use crate::batch::Batch;
-use crate::budget::{Stop, Watch};
+use crate::budget::{Memory, Stop, Watch};
 use crate::explore::Space;
 use crate::known::Hashed;
 use crate::marking::{Width, linear_hash, mix};
@@ -60,6 +60,49 @@ fn read<W: Width>(width: W, record: &[u64]) -> (u64, &[u64]) {
 }
 
 impl HashedHalf<'_> {
+    /// Puts what waits into the half.
+    #[inline(always)]
+    fn settle<W: Width>(&mut self, width: W, finds: &mut Finds) {
+        let mine = std::mem::take(&mut self.mine);
+        self.insert_all(width, &mine[..self.waiting], finds);
+        (self.mine, self.waiting) = (mine, 0);
+    }
+
+    /// Looks up records, by the same passes as in the table for one thread (`table.rs`), and takes what is new.
+    #[inline(always)]
+    fn insert_all<W: Width>(&mut self, width: W, records: &[u64], finds: &mut Finds) {
+        let (words, stride, shape) = (width.words(), stride(width), self.shape);
+        let (mut mixed, mut seen) = ([0_u64; ROOM], [0_u32; ROOM]);
+        let (mut tagged, mut open) = ([0_u8; ROOM], [0_u8; ROOM]);
+        for batch in records.chunks(BATCH * stride) {
+            let count = batch.len() / stride;
+            for (c, record) in batch.chunks_exact(stride).enumerate() {
+                mixed[c % ROOM] = read(width, record).0;
+                seen[c % ROOM] = self.slots[shape.home(mixed[c % ROOM]) & (self.slots.len() - 1)];
+            }
+            let (mut fits, mut others) = (0_u8, 0_u8);
+            for c in 0..count {
+                let fit = shape.fits(seen[c % ROOM], mixed[c % ROOM]);
+                tagged[usize::from(fits)] = c as u8;
+                open[usize::from(others)] = c as u8;
+                fits = fits.wrapping_add(u8::from(fit));
+                others = others.wrapping_add(u8::from(!fit));
+            }
+            let mut others = usize::from(others);
+            let fresh = finds.fresh.all();
+            for &c in &tagged[..usize::from(fits)] {
+                let index = shape.index_in(seen[usize::from(c)]);
+                let (_, marking) = read(width, &batch[usize::from(c) * stride..]);
+                open[others % ROOM] = c;
+                others += usize::from(self.marking(fresh, index, words) != marking);
+            }
+            for k in 0..others {
+                let c = usize::from(open[k % ROOM]);
+                self.insert_one(width, mixed[c], &batch[c * stride..(c + 1) * stride], finds);
+            }
+        }
+    }
+
     /// The marking of an index in this half.
     #[inline(always)]
     fn marking<'b>(&'b self, fresh: &'b [u64], index: usize, words: usize) -> &'b [u64] {
@@ -133,24 +176,28 @@ impl HashedHalf<'_> {
 }
 
 impl<W: Width> Half<W> for HashedHalf<'_> {
+    fn begin(&mut self, _: &Memory, _: &mut Watch<'_>) -> Result<(), Stop> {
+        Ok(())
+    }
+
     #[inline(always)]
     fn stride(&self, width: W) -> usize {
         stride(width)
     }
 
     #[inline(always)]
-    fn cut(&self, width: W, batch: &mut Batch) {
+    fn cut(&mut self, width: W, batch: &mut Batch) {
         batch.cut(width);
     }
 
     #[inline(always)]
-    fn push(&mut self, width: W, net: &Net, batch: &Batch, t: usize, fire: u64, theirs: (&mut [u64], &mut usize)) {
+    fn push(&mut self, width: W, net: &Net, batch: &Batch, t: usize, fire: u64, to: To<'_, '_>) {
         let (words, stride) = (width.words(), stride(width));
         let (flip, flip_hash) = (&net.flip(t, words)[..words], net.flip_hashes[t]);
         if self.mine.len() < self.waiting + 64 * stride {
             self.mine.resize(self.waiting + 64 * stride, 0);
         }
-        let (theirs, len) = theirs;
+        let (theirs, len) = to.theirs;
         let (mine, mut a, mut b) = (self.mine.as_mut_slice(), self.waiting, *len);
         let mut rest = fire;
         while rest != 0 {
@@ -173,50 +220,28 @@ impl<W: Width> Half<W> for HashedHalf<'_> {
             b += stride * is_theirs;
         }
         (self.waiting, *len) = (a, b);
-    }
-
-    #[inline(always)]
-    fn settle(&mut self, width: W, all: bool, finds: &mut Finds) {
-        if all || self.waiting >= BATCH * stride(width) {
-            let mine = std::mem::take(&mut self.mine);
-            self.insert(width, &mine[..self.waiting], finds);
-            (self.mine, self.waiting) = (mine, 0);
+        if self.waiting >= BATCH * stride {
+            self.settle(width, to.finds);
         }
     }
 
-    /// The same passes as in the table for one thread (`table.rs`).
     #[inline(always)]
-    fn insert(&mut self, width: W, records: &[u64], finds: &mut Finds) {
-        let (words, stride, shape) = (width.words(), stride(width), self.shape);
-        let (mut mixed, mut seen) = ([0_u64; ROOM], [0_u32; ROOM]);
-        let (mut tagged, mut open) = ([0_u8; ROOM], [0_u8; ROOM]);
-        for batch in records.chunks(BATCH * stride) {
-            let count = batch.len() / stride;
-            for (c, record) in batch.chunks_exact(stride).enumerate() {
-                mixed[c % ROOM] = read(width, record).0;
-                seen[c % ROOM] = self.slots[shape.home(mixed[c % ROOM]) & (self.slots.len() - 1)];
-            }
-            let (mut fits, mut others) = (0_u8, 0_u8);
-            for c in 0..count {
-                let fit = shape.fits(seen[c % ROOM], mixed[c % ROOM]);
-                tagged[usize::from(fits)] = c as u8;
-                open[usize::from(others)] = c as u8;
-                fits = fits.wrapping_add(u8::from(fit));
-                others = others.wrapping_add(u8::from(!fit));
-            }
-            let mut others = usize::from(others);
-            let fresh = finds.fresh.all();
-            for &c in &tagged[..usize::from(fits)] {
-                let index = shape.index_in(seen[usize::from(c)]);
-                let (_, marking) = read(width, &batch[usize::from(c) * stride..]);
-                open[others % ROOM] = c;
-                others += usize::from(self.marking(fresh, index, words) != marking);
-            }
-            for k in 0..others {
-                let c = usize::from(open[k % ROOM]);
-                self.insert_one(width, mixed[c], &batch[c * stride..(c + 1) * stride], finds);
-            }
+    fn end(&mut self, width: W, _: &Net, _: &Batch, round: bool, to: To<'_, '_>) {
+        if round {
+            self.settle(width, to.finds);
         }
+    }
+
+    /// The whole table grows at once, when nobody works on it.
+    fn wants_room(&self, _: bool) -> bool {
+        false
+    }
+
+    fn take_room(&mut self, _: &mut Finds, _: &mut Watch<'_>) {}
+
+    #[inline(always)]
+    fn insert(&mut self, width: W, records: &[u64], finds: &mut Finds, _: &mut Watch<'_>) {
+        self.insert_all(width, records, finds);
     }
 }
 
@@ -233,12 +258,16 @@ impl<W: Width> Shared<W> for Hashed {
     type Half<'a> = HashedHalf<'a>;
     const GOES_ON: bool = false;
 
+    fn cut(&mut self, _: W, _: &Space, _: usize, _: f64) -> bool {
+        true
+    }
+
     fn halves<'a>(&'a mut self, table: &'a mut Table) -> (&'a Store, [HashedHalf<'a>; 2]) {
         let (store, slots, shape) = table.parts();
         (store, halves((store, slots, shape)))
     }
 
-    fn complete(&mut self, width: W, space: &mut Space, finds: [&Finds; 2], _: &mut Watch<'_>) -> Result<(), Stop> {
+    fn complete(&mut self, width: W, space: &mut Space, finds: [&Finds; 2]) -> Result<(), Stop> {
         let (store, slots, shape) = space.table.parts();
         let even = finds[0].fresh.len().min(finds[1].fresh.len()) / BLOCK;
         let base = store.len();

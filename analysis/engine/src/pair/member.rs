@@ -13,10 +13,11 @@
 
 use std::hint::spin_loop;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvError, Sender, TryRecvError, channel};
+use std::sync::mpsc::{Receiver, RecvError, RecvTimeoutError, Sender, TryRecvError, channel};
 use std::thread::yield_now;
+use std::time::Duration;
 
-use super::half::{BLOCK, End, Finds, Half};
+use super::half::{BLOCK, End, Finds, Half, To};
 use crate::batch::Batch;
 use crate::budget::{Found, Stop, Watch};
 use crate::marking::Width;
@@ -24,10 +25,13 @@ use crate::net::Net;
 use crate::table::NONE;
 
 /// Edges after which a round ends.
-const ROUND_EDGES: u64 = 1 << 13;
+const ROUND_EDGES: u64 = 1 << 10;
 /// Looks for a message before one sleeps, some hundred microseconds; so many of them at once, some microseconds.
 const LOOKS: usize = 1 << 9;
 const LOOKS_AT_ONCE: usize = 1 << 7;
+
+/// How long one sleeps before he looks whether he is still wanted.
+const SLEEP: Duration = Duration::from_millis(20);
 
 /// What both threads know of the work.
 pub(crate) struct Work<'a> {
@@ -42,6 +46,8 @@ pub(crate) struct Work<'a> {
     pub(crate) go_on: Option<usize>,
     /// Whether a second processor is free.
     pub(crate) free: &'a AtomicBool,
+    /// Whether the first of them must end while the second does not hear it.
+    pub(crate) stopped: &'a AtomicBool,
     /// What had been found when the threads began.
     pub(crate) before: Found,
 }
@@ -90,8 +96,8 @@ struct Records {
 
 /// What one thread sends another.
 enum Message {
-    /// The records of a round; the last of a level or not, and why the sender must end.
-    Parcel { records: Records, last: bool, end: Option<End>, found: Found },
+    /// The records of a round; the last of a level or not, why the sender must end, and whether he takes more room next.
+    Parcel { records: Records, last: bool, end: Option<End>, found: Found, grows: bool },
     /// All parcels are filed: what was found of the next level, why the sender must end, and whether he would go on.
     Filed { count: usize, end: Option<End>, go_on: bool },
 }
@@ -114,16 +120,21 @@ impl Port {
         let _ = self.to.send(message);
     }
 
-    fn receive(&self) -> Result<Message, RecvError> {
+    /// What the other has sent; nothing where that takes long.
+    fn receive(&self) -> Result<Option<Message>, RecvError> {
         for look in 0..LOOKS {
             match self.from.try_recv() {
-                Ok(message) => return Ok(message),
+                Ok(message) => return Ok(Some(message)),
                 Err(TryRecvError::Disconnected) => return Err(RecvError),
                 Err(TryRecvError::Empty) if look < LOOKS_AT_ONCE => spin_loop(),
                 Err(TryRecvError::Empty) => yield_now(),
             }
         }
-        self.from.recv()
+        match self.from.recv_timeout(SLEEP) {
+            Ok(message) => Ok(Some(message)),
+            Err(RecvTimeoutError::Timeout) => Ok(None),
+            Err(RecvTimeoutError::Disconnected) => Err(RecvError),
+        }
     }
 }
 
@@ -178,29 +189,69 @@ impl Member {
         work: &Work<'_>,
         half: &mut impl Half<W>,
         port: &Port,
-        mut watch: Option<&mut Watch<'_>>,
+        watch: &mut Watch<'_>,
     ) -> Option<End> {
-        self.share = Share::Dealt;
+        (self.share, self.blocks) = (Share::Dealt, 0);
+        if let Err(stop) = half.begin(&self.finds.memory, watch) {
+            self.finds.close(stop);
+        }
+        // Who is left alone by a panic ends as if all were done; that comes out where the other is joined.
+        let (_, begun, mut go_on) = self.agree(work, port, 0, watch).ok()?;
+        if begun.is_some() {
+            return begun;
+        }
         let (mut from, mut base) = (0, work.base);
+        let (mut spent, mut found) = (0, 0);
         loop {
             self.blocks = 0;
-            // Who is left alone by a panic ends as if all were done; that comes out where the other is joined.
-            let ended = self.level(width, work, half, port, watch.as_deref_mut()).ok()?;
+            let ended = self.level(width, work, half, port, watch).ok()?;
             let count = self.finds.fresh.len() - from;
-            let go_on = work.free.load(Ordering::Relaxed);
-            port.send(Message::Filed { count, end: self.finds.end, go_on });
-            let Message::Filed { count: others, end, go_on: also } = port.receive().ok()? else {
-                unreachable!("a thread says last that all is filed")
-            };
-            let ended = ended.max(end).max(self.finds.end);
+            let (others, end, also);
+            (others, end, also) = self.agree(work, port, count, watch).ok()?;
+            go_on &= also;
+            let ended = ended.max(end);
             self.finds.levels.push(count);
-            if ended.is_some() || !go_on || !also || work.go_on.is_none_or(|least| count + others < least) {
+            spent += 2 * count.max(others);
+            found += count + others;
+            let is_uneven = found > work.base && 4 * spent > 5 * found;
+            if ended.is_some() || !go_on || is_uneven || work.go_on.is_none_or(|least| count + others < least) {
                 return ended;
             }
             let counts = if self.finds.id == 0 { [count, others] } else { [others, count] };
             self.share = Share::Own { from, base, counts };
             from += count;
             base += count + others;
+        }
+    }
+
+    /// Tells the other how much was found of a level, and hears it of him; why one of them must end, and whether both would
+    /// go on.
+    fn agree(
+        &mut self,
+        work: &Work<'_>,
+        port: &Port,
+        count: usize,
+        watch: &mut Watch<'_>,
+    ) -> Result<(usize, Option<End>, bool), RecvError> {
+        let go_on = work.free.load(Ordering::Relaxed);
+        port.send(Message::Filed { count, end: self.finds.end, go_on });
+        let Message::Filed { count, end, go_on: also } = self.next(work, port, watch)? else {
+            unreachable!("a thread says last that all is filed")
+        };
+        Ok((count, end.max(self.finds.end), go_on && also))
+    }
+
+    /// The next message of the other.
+    fn next(&mut self, work: &Work<'_>, port: &Port, watch: &mut Watch<'_>) -> Result<Message, RecvError> {
+        loop {
+            if let Some(message) = port.receive()? {
+                return Ok(message);
+            }
+            // He is at something that takes long, such as a larger table.
+            if let Err(stop) = watch.tick(ROUND_EDGES as usize) {
+                work.stopped.store(true, Ordering::Relaxed);
+                self.finds.end(End::Stopped(stop));
+            }
         }
     }
 
@@ -211,35 +262,40 @@ impl Member {
         work: &Work<'_>,
         half: &mut impl Half<W>,
         port: &Port,
-        mut watch: Option<&mut Watch<'_>>,
+        watch: &mut Watch<'_>,
     ) -> Result<Option<End>, RecvError> {
         let (mut sent, mut read) = (0, 0);
         let (mut is_last, mut was_last, mut its_end) = (false, false, None);
         while !is_last || !was_last {
             if !is_last {
                 if self.finds.end.is_none() && its_end.is_none() {
-                    self.round(width, work, half, watch.as_deref_mut());
+                    self.round(width, work, half, watch);
                 }
                 let done = self.share.block(work, self.finds.id, self.blocks).is_none();
                 is_last = done || self.finds.end.is_some() || its_end.is_some();
                 let found = Found { markings: self.finds.fresh.len() as u64, edges: self.edges };
                 let records = std::mem::replace(&mut self.theirs, self.spare.pop().unwrap_or_default());
-                port.send(Message::Parcel { records, last: is_last, end: self.finds.end, found });
+                let grows = half.wants_room(false);
+                port.send(Message::Parcel { records, last: is_last, end: self.finds.end, found, grows });
                 sent += 1;
+                if grows {
+                    half.take_room(&mut self.finds, watch);
+                }
             }
             while !was_last && (is_last || read + 1 < sent) {
-                let Message::Parcel { records, last, end, found: other } = port.receive()? else {
+                let Message::Parcel { records, last, end, found: other, grows } = self.next(work, port, watch)? else {
                     unreachable!("a thread says that all is filed after its last parcel")
                 };
-                self.receive(width, half, records);
+                self.receive(width, half, records, watch);
+                if grows && half.wants_room(true) {
+                    half.take_room(&mut self.finds, watch);
+                }
                 (was_last, its_end) = (last, its_end.max(end));
                 read += 1;
-                if let Some(watch) = &mut watch {
-                    watch.found.markings = work.before.markings + self.finds.fresh.len() as u64 + other.markings;
-                    watch.found.edges = work.before.edges + self.edges + other.edges;
-                    if let Err(stop) = watch.tick(ROUND_EDGES as usize) {
-                        self.finds.end(End::Stopped(stop));
-                    }
+                watch.found.markings = work.before.markings + self.finds.fresh.len() as u64 + other.markings;
+                watch.found.edges = work.before.edges + self.edges + other.edges;
+                if let Err(stop) = watch.tick(ROUND_EDGES as usize) {
+                    self.finds.end(End::Stopped(stop));
                 }
             }
         }
@@ -254,36 +310,29 @@ impl Member {
     }
 
     /// Files what the other sent, and keeps its buffer.
-    fn receive<W: Width>(&mut self, width: W, half: &mut impl Half<W>, mut records: Records) {
-        half.insert(width, &records.all[..records.len], &mut self.finds);
+    fn receive<W: Width>(&mut self, width: W, half: &mut impl Half<W>, mut records: Records, watch: &mut Watch<'_>) {
+        half.insert(width, &records.all[..records.len], &mut self.finds, watch);
         records.len = 0;
         self.spare.push(records);
     }
 
     /// Expands blocks of its share until a round's edges are followed.
-    fn round<W: Width>(
-        &mut self,
-        width: W,
-        work: &Work<'_>,
-        half: &mut impl Half<W>,
-        mut watch: Option<&mut Watch<'_>>,
-    ) {
+    fn round<W: Width>(&mut self, width: W, work: &Work<'_>, half: &mut impl Half<W>, watch: &mut Watch<'_>) {
         let first = self.edges;
         while self.finds.end.is_none() && self.edges - first < ROUND_EDGES {
             let Some(block) = self.share.block(work, self.finds.id, self.blocks) else { break };
             let before = self.edges;
-            if let Err(stop) = self.expand(width, work, half, block) {
+            if let Err(stop) = self.expand(width, work, half, block, watch) {
                 debug_assert_eq!(stop, Stop::Memory);
                 self.finds.end(End::Short);
                 break;
             }
-            if let Some(watch) = &mut watch
-                && let Err(stop) = watch.tick(BLOCK + (self.edges - before) as usize + work.net.transitions.len())
-            {
+            if let Err(stop) = watch.tick(BLOCK + (self.edges - before) as usize + work.net.transitions.len()) {
                 self.finds.end(End::Stopped(stop));
             }
         }
-        half.settle(width, true, &mut self.finds);
+        let theirs = (self.theirs.all.as_mut_slice(), &mut self.theirs.len);
+        half.end(width, work.net, &self.batch, true, To { finds: &mut self.finds, theirs, watch });
     }
 
     /// Expands one block, unless there is no memory for what it gives.
@@ -293,6 +342,7 @@ impl Member {
         work: &Work<'_>,
         half: &mut impl Half<W>,
         (first, count, own): (usize, usize, Option<usize>),
+        watch: &mut Watch<'_>,
     ) -> Result<(), Stop> {
         let (net, words) = (work.net, width.words());
         let (all, at) = own.map_or((work.old, first), |own| (self.finds.fresh.all(), own));
@@ -337,10 +387,22 @@ impl Member {
         self.blocks += 1;
         for &(t, fire) in &self.firing {
             self.fired[t as usize] += u64::from(fire.count_ones());
-            half.push(width, net, &self.batch, t as usize, fire, (&mut self.theirs.all, &mut self.theirs.len));
-            half.settle(width, false, &mut self.finds);
+            let theirs = (self.theirs.all.as_mut_slice(), &mut self.theirs.len);
+            let to = To { finds: &mut self.finds, theirs, watch };
+            half.push(width, net, &self.batch, t as usize, fire, to);
         }
+        let theirs = (self.theirs.all.as_mut_slice(), &mut self.theirs.len);
+        half.end(width, net, &self.batch, false, To { finds: &mut self.finds, theirs, watch });
         Ok(())
+    }
+
+    /// Forgets what it counted.
+    pub(crate) fn forget(&mut self) {
+        self.edges = 0;
+        self.fired.fill(0);
+        self.contacts.fill(0);
+        self.contact_witness.fill(NONE);
+        self.deadlocks.clear();
     }
 
     /// Room for so many words more in the buffer.
