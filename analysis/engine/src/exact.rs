@@ -11,8 +11,9 @@
 //! keys of six stand in the bucket where they belong. The others stand in a following one, and a slot says how far it
 //! has moved (its low bits; 0 is an empty slot), so that its key can still be told. There are 2^k or 3 * 2^k buckets,
 //! so a large table grows by a third or by half, never by two, and is never less than half full; up to some mebibytes it
-//! doubles, which moves keys half as often. Buckets are in the order of the mixed keys; so growing reads one table and
-//! writes the other from end to end, and needs neither the markings nor their hashes.
+//! doubles, which moves keys half as often, and so do, for as long as they last, those of two threads (`sides.rs`). Buckets
+//! are in the order of the mixed keys; so growing reads one table and writes the other from end to end, and needs neither
+//! the markings nor their hashes.
 //!
 //! The index of a marking is not needed while exploring; `indexes.rs` puts it beside the slots when somebody asks for
 //! it.

@@ -260,9 +260,8 @@ impl Space {
     #[cold]
     fn note_contact(&mut self, t: usize, first: usize, contact: u64) {
         self.contacts[t] += u64::from(contact.count_ones());
-        if self.contact_witness[t] == NONE {
-            self.contact_witness[t] = first as u32 + contact.trailing_zeros();
-        }
+        // Two threads may have noted a later one.
+        self.contact_witness[t] = self.contact_witness[t].min(first as u32 + contact.trailing_zeros());
     }
 
     fn note_deadlocks(&mut self, first: usize, mut dead: u64) -> Result<(), Stop> {

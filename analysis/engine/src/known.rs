@@ -164,7 +164,7 @@ pub struct ByKey<'a, S> {
     pub(crate) asked: Asked<S>,
     /// The marking of the batch (low six bits) and the transition that made each.
     made: [u32; ROOM],
-    /// While two threads explore, the side of each.
+    /// While two threads explore, how the set is cut, and the table of each.
     pub(crate) sides: Option<Sides<S>>,
 }
 

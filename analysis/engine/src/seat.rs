@@ -5,8 +5,8 @@
 //! off that the power of two below n spans: what remains, the tag, tells them apart. For n = 2^k or 3 * 2^k, the mixed
 //! key comes back from both by a division by 2 or 3.
 //!
-//! Rejected: powers of two alone (a table then doubles, and is three eighths full afterwards); any n (growth would
-//! divide by a variable).
+//! Rejected: powers of two alone (a table then doubles, and is three eighths full afterwards, as those of two threads are
+//! for a while); any n (growth would divide by a variable).
 
 use bytemuck::Pod;
 use wide::{CmpEq, i32x4};

@@ -18,7 +18,7 @@ impl<S: Slot> Exact<S> {
         Self::bytes(self.shape)
     }
 
-    /// Takes twice as many buckets.
+    /// Takes twice as many buckets, or more while they are few.
     pub(crate) fn double(&mut self, memory: &Memory, watch: &mut Watch<'_>) -> Result<(), Stop> {
         self.grow_beyond(self.shape.larger()?, memory, watch)
     }
@@ -87,6 +87,24 @@ impl<S: Slot> Exact<S> {
             filled?;
             shape = shape.roomier()?;
         }
+    }
+
+    /// Holds these keys and no others, which are not more than it held; what it held, where the system has no memory for them.
+    pub(crate) fn replace_by<I: Iterator<Item = u64>>(&mut self, keys: impl Fn() -> I, len: usize, memory: &Memory) {
+        memory.release(self.claimed());
+        let mut shape = Self::roomy(self.shape.bits, len);
+        while let Ok(next) = shape
+            && let Ok(slots) = Self::room(next, memory)
+        {
+            let mut these = Exact { slots, shape: next, len };
+            if keys().all(|key| these.place(key)) {
+                *self = these;
+                return;
+            }
+            memory.release(these.claimed());
+            shape = next.roomier();
+        }
+        memory.claim(self.claimed()).expect("released just now");
     }
 
     /// Fills the table, which is empty, by two threads; gives back what found no place.
@@ -221,6 +239,15 @@ mod tests {
         let shape = Shape::new(20, 2, 5);
         let keys: Vec<u64> = ((1 << 19) - 900..(1 << 19) + 100).map(|mixed: u64| shape.unmixed(mixed)).collect();
         is_cut_and_joint::<u64>(20, &keys);
+    }
+
+    #[test]
+    fn a_table_that_is_replaced_holds_the_new_keys_alone() {
+        let memory = Memory::new(1 << 28);
+        let mut whole = table::<u32>(24, 0..30_000, &memory);
+        whole.replace_by(|| (0..30_000).step_by(3), 10_000, &memory);
+        assert_eq!((whole.len(), memory.used()), (10_000, whole.claimed()));
+        assert!((0..60_000).all(|key| whole.has(key) == (key < 30_000 && key % 3 == 0)));
     }
 
     #[test]

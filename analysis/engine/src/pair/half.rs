@@ -28,7 +28,7 @@ pub(crate) enum End {
     Stopped(Stop),
 }
 
-/// What one thread finds in a level.
+/// What one thread finds until it ends.
 pub(crate) struct Finds {
     /// Which thread, 0 or 1.
     pub(crate) id: usize,
@@ -151,13 +151,13 @@ pub(crate) trait Shared<W: Width>: Arrivals<W> {
     fn halves<'a>(&'a mut self, table: &'a mut Table) -> (&'a Store, [Self::Half<'a>; 2]);
 
     /// Makes the set say all that was found, by the indexes that the markings are about to get in the array: in each level
-    /// in turn `BLOCK` of each thread, as long as both have them, then what one and the other have more.
-    /// Of memory of the finds nothing is held by the set any more. After an error it holds what it held before, or needs
+    /// in turn `BLOCK` of each thread, as long as both have them, then what one and the other have more. Of the memory of
+    /// the finds the set holds nothing any more. After an error it holds what it held before, or needs
     /// `forget_others`.
     fn complete(&mut self, width: W, space: &mut Space, finds: [&Finds; 2]) -> Result<(), Stop>;
 
-    /// Makes room for more; false where there is no memory for that. After an error a set of hashes cannot be used any
-    /// more; one of keys has lost none.
+    /// Makes room for more; false where there is no memory for that. After an error the set cannot be used any
+    /// more. A set that goes on from level to level is never asked.
     fn grow(&mut self, width: W, space: &mut Space, watch: &mut Watch<'_>) -> Result<bool, Stop>;
 
     /// Puts what found no place in its half into the whole set: keys, or records of markings.

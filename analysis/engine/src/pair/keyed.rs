@@ -16,6 +16,7 @@
 
 use super::half::{Finds, Half, Shared, To};
 use super::parting::Parting;
+use crate::apart::Apart;
 use crate::batch::Batch;
 use crate::budget::{Memory, Stop, Watch};
 use crate::exact::{Asked, Exact, ROOM};
@@ -36,7 +37,7 @@ const ALSO_FULL: f64 = 0.5;
 /// How a set is cut, and the tables of both sides once they are made.
 pub(crate) struct Sides<S> {
     parting: Parting,
-    tables: [Option<Exact<S>>; 2],
+    tables: [Apart<Option<Exact<S>>>; 2],
 }
 
 /// One side, in the hands of its thread.
@@ -197,14 +198,14 @@ impl<W: Width, S: Slot> Shared<W> for ByKey<'_, S> {
         // The last two levels.
         let first = space.levels[space.levels.len().saturating_sub(2)] as usize;
         let parting = Parting::choose(width, space, (span, spread), (first, end), loss_most);
-        self.sides = parting.map(|parting| Sides { parting, tables: [None, None] });
+        self.sides = parting.map(|parting| Sides { parting, tables: [Apart(None), Apart(None)] });
         self.sides.is_some()
     }
 
     fn halves<'a>(&'a mut self, table: &'a mut Table) -> (&'a Store, [KeyedHalf<'a, S>; 2]) {
         let (span, spread, whole) = self.keyed.parts();
         let whole = &*whole;
-        let Sides { parting, tables: [low, high] } = self.sides.as_mut().expect("cut before");
+        let Sides { parting, tables: [Apart(low), Apart(high)] } = self.sides.as_mut().expect("cut before");
         let half = |(id, table)| KeyedHalf {
             id,
             whole,
@@ -219,8 +220,9 @@ impl<W: Width, S: Slot> Shared<W> for ByKey<'_, S> {
         (&table.store, [(0, low), (1, high)].map(half))
     }
 
+    /// Time is not asked for here: without the joint table all that was found would be lost.
     fn complete(&mut self, _: W, space: &mut Space, finds: [&Finds; 2]) -> Result<(), Stop> {
-        let tables = self.sides.take().map_or([None, None], |sides| sides.tables);
+        let tables = self.sides.take().map_or([None, None], |sides| sides.tables.map(|Apart(table)| table));
         let whole = self.keyed.parts().2;
         let result = match &tables {
             // What was found before is in the one table, and nothing else was found.
@@ -264,5 +266,42 @@ impl<W: Width, S: Slot> Shared<W> for ByKey<'_, S> {
         Ok(())
     }
 
-    fn forget_others(&mut self, _: W, _: &mut Space) {}
+    fn forget_others(&mut self, width: W, space: &mut Space) {
+        self.sides = None;
+        let (span, _, exact) = self.keyed.parts();
+        let (store, words) = (&space.table.store, width.words());
+        let keys = || store.all()[..store.len() * words].chunks_exact(words).map(|marking| span.key(marking));
+        exact.replace_by(keys, store.len(), &space.memory);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::unwatched;
+    use crate::explore::Limits;
+    use crate::known::Set;
+    use crate::marking::Fixed;
+    use crate::samples::{explore, machines};
+
+    #[test]
+    fn what_is_not_in_the_array_is_forgotten() {
+        let limits = Limits { step: false, markings: 300, memory_bytes: 1 << 28, time: None };
+        let mut space = Space::explore(machines(11, 0), limits, &mut unwatched).expect("begins");
+        let Set::Narrow(mut keyed) = std::mem::replace(&mut space.set, Set::Hashed) else { panic!("few bits") };
+        let (mut set, mut poll) = (ByKey::new(&mut keyed), unwatched);
+        let mut watch = Watch::new(None, &mut poll);
+        let all = explore(machines(11, 0), false);
+        for index in 0..all.len() {
+            let key = set.keyed.span.key(all.marking(index));
+            set.keyed.exact.put(&mut set.asked, key, (&space.memory, &mut watch), || Ok(())).expect("fits");
+        }
+        Shared::<Fixed<1>>::forget_others(&mut set, Fixed::<1>, &mut space);
+        let stored: Vec<&[u64]> = (0..space.len()).map(|index| space.marking(index)).collect();
+        assert_eq!(stored.len(), 300);
+        for index in 0..all.len() {
+            let marking = all.marking(index);
+            assert_eq!(set.keyed.exact.has(set.keyed.span.key(marking)), stored.contains(&marking));
+        }
+    }
 }

@@ -1,5 +1,5 @@
-//! One thread of a pair: it expands its share of a level, files the successors whose hash is its own, and sends the others
-//! to their owner, a parcel in each round.
+//! One thread of a pair: it expands its share of a level, files the successors that are its own, and sends the others to
+//! their owner, a parcel in each round.
 //!
 //! A parcel of a round is read after the next one is sent, so that a thread seldom waits for the other. Who has sent his last
 //! reads all that is left, and says how many markings he has found. Where the set allows it, both then take up the next
@@ -13,7 +13,7 @@
 
 use std::hint::spin_loop;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvError, RecvTimeoutError, Sender, TryRecvError, channel};
+use std::sync::mpsc::{Receiver, RecvError, RecvTimeoutError, SyncSender, TryRecvError, sync_channel};
 use std::thread::yield_now;
 use std::time::Duration;
 
@@ -30,6 +30,10 @@ const ROUND_EDGES: u64 = 1 << 10;
 const LOOKS: usize = 1 << 9;
 const LOOKS_AT_ONCE: usize = 1 << 7;
 
+/// Messages that may be under way; more would be more buffers than are claimed, where one is at something that takes long.
+const UNDER_WAY: usize = 4;
+/// Empty buffers that are kept: who hands over less than he is sent would have ever more.
+const SPARE_MOST: usize = 2;
 /// How long one sleeps before he looks whether he is still wanted.
 const SLEEP: Duration = Duration::from_millis(20);
 
@@ -104,14 +108,14 @@ enum Message {
 
 /// The ends of the channels of one thread, to and from the other.
 pub(crate) struct Port {
-    to: Sender<Message>,
+    to: SyncSender<Message>,
     from: Receiver<Message>,
 }
 
 impl Port {
     /// Both.
     pub(crate) fn both() -> [Port; 2] {
-        let ((a, to_a), (b, to_b)) = (channel(), channel());
+        let ((a, to_a), (b, to_b)) = (sync_channel(UNDER_WAY), sync_channel(UNDER_WAY));
         [Port { to: b, from: to_a }, Port { to: a, from: to_b }]
     }
 
@@ -225,7 +229,7 @@ impl Member {
     }
 
     /// Tells the other how much was found of a level, and hears it of him; why one of them must end, and whether both would
-    /// go on.
+    /// go on. Both conclude the same: what one notices while he waits he says in the next level.
     fn agree(
         &mut self,
         work: &Work<'_>,
@@ -233,12 +237,12 @@ impl Member {
         count: usize,
         watch: &mut Watch<'_>,
     ) -> Result<(usize, Option<End>, bool), RecvError> {
-        let go_on = work.free.load(Ordering::Relaxed);
-        port.send(Message::Filed { count, end: self.finds.end, go_on });
+        let (go_on, said) = (work.free.load(Ordering::Relaxed), self.finds.end);
+        port.send(Message::Filed { count, end: said, go_on });
         let Message::Filed { count, end, go_on: also } = self.next(work, port, watch)? else {
             unreachable!("a thread says last that all is filed")
         };
-        Ok((count, end.max(self.finds.end), go_on && also))
+        Ok((count, end.max(said), go_on && also))
     }
 
     /// The next message of the other.
@@ -249,10 +253,16 @@ impl Member {
             }
             // He is at something that takes long, such as a larger table.
             if let Err(stop) = watch.tick(ROUND_EDGES as usize) {
-                work.stopped.store(true, Ordering::Relaxed);
-                self.finds.end(End::Stopped(stop));
+                self.stop(work, stop);
             }
         }
+    }
+
+    /// Ends because time is over, or nobody needs the answer; who does not hear it in time looks himself.
+    #[cold]
+    fn stop(&mut self, work: &Work<'_>, stop: Stop) {
+        work.stopped.store(true, Ordering::Relaxed);
+        self.finds.end(End::Stopped(stop));
     }
 
     /// Expands its share of a level, as long as nobody must end, and files all that is its; why the other must end.
@@ -295,7 +305,7 @@ impl Member {
                 watch.found.markings = work.before.markings + self.finds.fresh.len() as u64 + other.markings;
                 watch.found.edges = work.before.edges + self.edges + other.edges;
                 if let Err(stop) = watch.tick(ROUND_EDGES as usize) {
-                    self.finds.end(End::Stopped(stop));
+                    self.stop(work, stop);
                 }
             }
         }
@@ -313,7 +323,9 @@ impl Member {
     fn receive<W: Width>(&mut self, width: W, half: &mut impl Half<W>, mut records: Records, watch: &mut Watch<'_>) {
         half.insert(width, &records.all[..records.len], &mut self.finds, watch);
         records.len = 0;
-        self.spare.push(records);
+        if self.spare.len() < SPARE_MOST {
+            self.spare.push(records);
+        }
     }
 
     /// Expands blocks of its share until a round's edges are followed.
@@ -328,7 +340,7 @@ impl Member {
                 break;
             }
             if let Err(stop) = watch.tick(BLOCK + (self.edges - before) as usize + work.net.transitions.len()) {
-                self.finds.end(End::Stopped(stop));
+                self.stop(work, stop);
             }
         }
         let theirs = (self.theirs.all.as_mut_slice(), &mut self.theirs.len);

@@ -1,4 +1,5 @@
-//! Interleaving exploration of large levels by two threads, with one numbering whatever the timing.
+//! Interleaving exploration of large levels by two threads, with one numbering whatever the timing, as long as a second
+//! processor is free.
 //!
 //! The markings are cut in two, and each half has its owner, who alone looks up and files what belongs there. Each thread
 //! expands its share of a level, files the successors that are its own, and hands the others over in a buffer, once a
@@ -178,6 +179,11 @@ impl Pair {
             drop(port);
             Some(end.max(its.join().unwrap_or_else(|panic| resume_unwind(panic))))
         });
+        // The second one only hears that it must end; the first knows why.
+        let worst = match here.finds.end {
+            Some(End::Stopped(stop)) => Some(Some(End::Stopped(stop))),
+            _ => worst,
+        };
         let Some(worst) = worst else { return (open.to_vec(), Some(End::Short)) };
         let mut left: Vec<_> = self.members.iter().flat_map(|Apart(member)| member.left(&work.0)).collect();
         left.sort_unstable();
@@ -207,13 +213,10 @@ impl Pair {
         space.memory.release(self.claimed.saturating_sub(after));
         self.claimed = self.claimed.min(after);
         let result = match result {
-            Ok(()) => {
-                Pair::count(a, space)?;
-                Pair::count(b, space)?;
-                append(space, [&a.finds, &b.finds], max)
-            }
+            Ok(()) => [&*a, &*b].into_iter().try_for_each(|member| Pair::count(member, space)),
             Err(stop) => Err(stop),
         };
+        let result = result.and_then(|()| append(space, [&a.finds, &b.finds], max));
         if result.is_err() {
             // The set says more than the array holds, which is still a prefix.
             set.forget_others(width, space);
@@ -247,8 +250,11 @@ impl Pair {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::batch::Batch;
     use crate::budget::unwatched;
     use crate::explore::Limits;
+    use crate::marking::Dynamic;
+    use crate::net::Transition;
     use crate::paths::path_to;
     use crate::samples::{machines, random_nets};
 
@@ -288,8 +294,24 @@ mod tests {
         }
     }
 
+    /// Whether of the markings that were certainly expanded none before the witness is in contact.
+    fn witnesses_are_first(space: &Space) {
+        let mut batch = Batch::new(&space.net);
+        for index in 0..*space.levels.last().expect("there is M0") as usize {
+            batch.markings.clear();
+            batch.markings.extend_from_slice(space.marking(index));
+            batch.slice(Dynamic(space.net.words));
+            for (t, &witness) in space.contact_witness.iter().enumerate() {
+                let (base, blocked) = space.net.forward.test(t, &batch.slices, batch.valid);
+                assert!(base & blocked == 0 || witness as usize <= index, "{witness} and {index}");
+                assert!(base & blocked != 0 || witness as usize != index);
+            }
+        }
+    }
+
     fn agree(one: &Space, many: &Space) {
         is_sound(many);
+        witnesses_are_first(many);
         assert_eq!((one.len(), one.edges, one.stop), (many.len(), many.edges, many.stop));
         assert_eq!((&one.fired, &one.contacts, &one.levels), (&many.fired, &many.contacts, &many.levels));
         assert!((0..one.len()).all(|index| many.find(one.marking(index)).is_some()));
@@ -356,6 +378,26 @@ mod tests {
     }
 
     #[test]
+    fn the_first_marking_in_contact_is_told_wherever_the_threads_ended() {
+        let mut transitions = machines(13, 0).transitions;
+        // So that the first are found in the level in which the threads end.
+        for k in 0..13 {
+            let busy = |i: u32| 2 * ((i + k) % 13) + 1;
+            let inputs: Vec<u32> = (0..5).map(|i| busy(2 * i)).collect();
+            transitions.push(Transition::new(&inputs, &[busy(10)], &[], &[], &[]));
+        }
+        let initial: Vec<u32> = (0..13).map(|i| 2 * i).collect();
+        let net = Net::new(26, transitions, &initial).expect("well formed");
+        let mut contacts = 0;
+        for markings in (2000..6500).step_by(100) {
+            let part = by_two(&net, Limits { markings, ..ALL });
+            contacts += part.contacts.iter().sum::<u64>();
+            witnesses_are_first(&part);
+        }
+        assert!(contacts > 0);
+    }
+
+    #[test]
     fn what_finds_no_room_is_put_where_it_belongs() {
         for net in random_nets(200) {
             let all = alone(&net, ALL);
@@ -364,6 +406,7 @@ mod tests {
                 let part = by_two(&net, limits);
                 is_sound(&part);
                 assert_eq!(part.len(), limits.markings);
+                witnesses_are_first(&part);
                 let level = |of: &Space, index: usize| of.levels.partition_point(|&first| first as usize <= index);
                 for index in 0..part.len() {
                     let there = all.find(part.marking(index)).expect("reachable") as usize;

@@ -2,7 +2,7 @@
 //!
 //! Whatever a firing does to that parity it does everywhere, so most transitions never lead from one side to the other, and
 //! the few that touch an odd number of these places always do. And the parity of tokens on a few places that have little to
-//! do with each other is even in about half of the markings, however rarely one of them is marked.
+//! do with each other is even in about half of the markings, even where each of them is marked in a fourth.
 //!
 //! The places are chosen by what was found so far: one after the other whichever lowers what a firing is expected to
 //! cost most, by the markings of the last two levels and by how often each transition has fired. If levels turn out
@@ -17,8 +17,9 @@ use crate::net::Net;
 use crate::span::Span;
 use crate::spread::Spread;
 
-/// Blocks of 64 markings that are looked at.
+/// Blocks of 64 markings that are looked at, and most bytes of them: of very wide nets fewer.
 const SAMPLE: usize = 64;
+const SAMPLE_BYTES: usize = 1 << 22;
 /// Most places whose tokens are counted.
 const PLACES_MOST: usize = 12;
 /// What it costs more to hand a firing over, as a part of what a firing costs.
@@ -130,7 +131,8 @@ impl Sample {
     fn take<W: Width>(width: W, space: &Space, (first, end): (usize, usize)) -> Self {
         let mut batch = Batch::new(&space.net);
         let (mut slices, mut valid) = (Vec::new(), Vec::new());
-        let step = (end - first).div_ceil(64).div_ceil(SAMPLE).max(1);
+        let blocks = SAMPLE.min(SAMPLE_BYTES / (8 * 64 * width.words())).max(1);
+        let step = (end - first).div_ceil(64).div_ceil(blocks).max(1);
         for first in (first..end).step_by(64 * step) {
             batch.markings.clear();
             space.table.store.copy_range(first, end.min(first + 64), &mut batch.markings);
