@@ -1,8 +1,10 @@
 """The report of `check`: everything that the state space of a net decides, as verdicts and figures.
 
-One question after the other to the same space. The verdicts say what holds, with their
-evidence; the figures are the numbers and sets behind them, for tables, tests and comparisons. A figure that needs the
-whole space is None where the budget ended first: an unknown number is not zero.
+One question after the other to the same space, each with a part of the time that is left, so that none keeps those
+behind it from being asked. Those for which that was too little have what is left then, but for a part that is for other
+techniques. The verdicts say what holds, with their evidence; the figures are the numbers and sets behind them, for
+tables, tests and comparisons. A figure that needs the whole space is None where the budget ended first: an unknown
+number is not zero.
 
 The tables below hold the verdicts in the order of the report. To add one: its technique in a file of its own, one row
 here.
@@ -12,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from functools import partial
 from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
@@ -30,10 +33,10 @@ from firable.analysis.verdicts.commands import (
     no_command_in_initial_marking,
 )
 from firable.analysis.verdicts.conflicts import ConflictAnalysis, Pairs, Steps
-from firable.analysis.verdicts.properties import decide_properties
+from firable.analysis.verdicts.properties import decide_stated
 from firable.analysis.verdicts.starvation import starvation_free
 from firable.nets.formula import Formula
-from firable.nets.net import Net
+from firable.nets.net import Net, Property, TemporalProperty
 from firable.nets.queries import Query
 from firable.nets.verdict import Status, Verdict, Weight, Witness, overall
 from firable.semantics.player import Player
@@ -146,19 +149,47 @@ def report_on(
     """
     behaviour, conflicts = Behaviour(space), ConflictAnalysis(space)
     steps = _steps(space)
-    verdicts = [
-        *(decide(behaviour) for decide in _ON_BEHAVIOUR),
-        self_loop_free(space),
-        *(decide(conflicts) for decide in _ON_CONFLICTS),
-        *([] if steps is None else [conflict.steps_serialisable(steps)]),
-        *(decide(space) for decide in _ON_SPACE),
-        starvation_free(behaviour),
-        *decide_properties(space, known),
-        *(known.get(f"query.{query.name}") or answer(space, query) for query in queries),
+
+    def on_property(of: Property | TemporalProperty) -> Verdict:
+        seen = known.get(f"property.{of.name}") if isinstance(of, TemporalProperty) else None
+        return seen or decide_stated(space, of)
+
+    def on_query(query: Query) -> Verdict:
+        return known.get(f"query.{query.name}") or answer(space, query)
+
+    asks: list[Callable[[], Verdict]] = [
+        *(partial(decide, behaviour) for decide in _ON_BEHAVIOUR),
+        partial(self_loop_free, space),
+        *(partial(decide, conflicts) for decide in _ON_CONFLICTS),
+        *([] if steps is None else [partial(conflict.steps_serialisable, steps)]),
+        *(partial(decide, space) for decide in _ON_SPACE),
+        partial(starvation_free, behaviour),
+        *(partial(on_property, of) for of in space.net.properties),
+        *(partial(on_query, query) for query in queries),
     ]
-    return CheckReport(space.net, space.discipline, figures(behaviour, conflicts, steps), tuple(verdicts), space)
+    verdicts = _in_turn(space, asks)
+    return CheckReport(space.net, space.discipline, figures(behaviour, conflicts, steps), verdicts, space)
 
 
+def _in_turn(space: StateSpace[Any], asks: Sequence[Callable[[], Verdict]]) -> tuple[Verdict, ...]:
+    """What is answered, in the order of the questions."""
+    verdicts = []
+    for ask in asks:
+        with space.turn(_TURN_SHARE):
+            verdicts.append(ask())
+    if space.complete and space.deadline.left_seconds is not None:
+        late = [i for i, verdict in enumerate(verdicts) if verdict.status is Status.UNKNOWN and verdict.code == "F3004"]
+        for left, i in zip(range(len(late), 0, -1), late, strict=True):
+            if not space.deadline.over:
+                with space.turn(1 / (left + 1)):
+                    verdicts[i] = asks[i]()
+    return tuple(verdicts)
+
+
+_TURN_SHARE: Final = 0.4
+"""The part of the time left that one verdict may take before the others have been asked for."""
+_FIGURE_SHARE: Final = 0.1
+"""The same of a figure, most of which are known from the verdicts."""
 _NOTEBOOK_WIDTH_PIXELS: Final = 900
 _PICTURES_MAX: Final = 3
 _ON_BEHAVIOUR: Final[tuple[Callable[[Behaviour[Any]], Verdict], ...]] = (
@@ -208,36 +239,37 @@ def figures(behaviour: Behaviour[Any], conflicts: ConflictAnalysis[Any], steps: 
     """The figures of a state space, each None where the budget ended before it was known."""
     space, net = behaviour.space, behaviour.space.net
     whole = space.complete
-    nonlive = _known(lambda: behaviour.nonlive)
+
+    def known(figure: Callable[[], T]) -> T | None:
+        try:
+            with space.turn(_FIGURE_SHARE):
+                return figure()
+        except (IncompleteGraph, BudgetExceeded):
+            return None
+
+    nonlive = known(lambda: behaviour.nonlive)
     firable = Player(net).firable(net.initial_marking)
     return Figures(
         markings=space.n_markings,
         edges=space.n_edges,
         complete=whole,
         bytes_per_marking=space.engine.bytes_per_marking if isinstance(space, ReachabilityGraph) else None,
-        deadlocks=_known(lambda: space.count(space.deadlocks)) if whole else None,
-        doomed=_known(lambda: space.count(behaviour.doomed)),
-        home=_known(lambda: behaviour.home),
-        reversible=_known(lambda: behaviour.reversible),
+        deadlocks=known(lambda: space.count(space.deadlocks)) if whole else None,
+        doomed=known(lambda: space.count(behaviour.doomed)),
+        home=known(lambda: behaviour.home),
+        reversible=known(lambda: behaviour.reversible),
         live=None if nonlive is None else not nonlive,
-        dead=_known(lambda: behaviour.dead) if whole else None,
+        dead=known(lambda: behaviour.dead) if whole else None,
         nonlive=nonlive,
-        contacts=_known(lambda: MappingProxyType(behaviour.contacts)) if whole else None,
+        contacts=known(lambda: MappingProxyType(behaviour.contacts)) if whole else None,
         self_loops=self_loops(net),
         firable_in_initial_marking=tuple(net.transitions[t].name for t in firable),
         structural_conflicts=conflicts.structural,
-        effective_conflicts=_known(lambda: conflicts.effective) if whole else None,
+        effective_conflicts=known(lambda: conflicts.effective) if whole else None,
         gate_races=conflicts.races,
         cut_short=(
             *(("structural_conflicts",) if conflicts.structural.more else ()),
             *(("gate_races",) if conflicts.more_races else ()),
         ),
-        nonserialisable=None if steps is None else _known(lambda: steps.nonserialisable),
+        nonserialisable=None if steps is None else known(lambda: steps.nonserialisable),
     )
-
-
-def _known(figure: Callable[[], T]) -> T | None:
-    try:
-        return figure()
-    except (IncompleteGraph, BudgetExceeded):
-        return None

@@ -13,6 +13,7 @@ to disagree on what a word means.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Generic, Protocol, TypeVar
@@ -104,6 +105,10 @@ class StateSpace(Protocol[S]):
 
     def until(self, deadline: Deadline) -> StateSpace[S]:
         """The same space, for questions that end with another deadline."""
+        ...
+
+    def turn(self, share: float) -> AbstractContextManager[None]:
+        """Let what is asked meanwhile take at most this part of the time that is left."""
         ...
 
     def require_complete(self) -> None:
@@ -198,6 +203,10 @@ class StateSpace(Protocol[S]):
 
 class Derived(Generic[S]):
     """The second half of a state space, from the first."""
+
+    def turn(self: StateSpace[S], share: float) -> AbstractContextManager[None]:  # noqa: ARG002
+        """No limit: to pass over markings that are held one by one is short beside finding them."""
+        return nullcontext()
 
     def satisfying(self: StateSpace[S], formula: Formula) -> S:
         """The markings in which a state formula holds."""

@@ -16,7 +16,8 @@ saturation lives on does not hold of it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -64,6 +65,17 @@ class SymbolicSpace(Derived[MarkingSet]):
         self.engine.limit(**engine_limits(deadline))
         return replace(self, deadline=deadline)
 
+    @contextmanager
+    def turn(self, share: float) -> Iterator[None]:
+        """Let what is asked meanwhile take at most this part of the time left: one fixpoint may take all of it."""
+        left = self.deadline.left_seconds
+        if left is not None:
+            self.engine.limit(**engine_limits(self.deadline.within(left * share)))
+        try:
+            yield
+        finally:
+            self.engine.limit(**engine_limits(self.deadline))
+
     def require_complete(self) -> None:
         """It always is: an incomplete search makes no space."""
 
@@ -95,15 +107,11 @@ class SymbolicSpace(Derived[MarkingSet]):
         told with every verdict and decides none, it may take but a part of the time that is left.
         """
         if "edges" not in self.counted:
-            left = self.deadline.left_seconds
-            share = self.deadline if left is None else Deadline.after(left * EDGES_SHARE, self.deadline.cancelled)
-            self.engine.limit(**engine_limits(share))
             try:
-                self.counted["edges"] = self.reach.edges()
+                with self.turn(EDGES_SHARE):
+                    self.counted["edges"] = self.reach.edges()
             except BudgetExceeded:
                 return None
-            finally:
-                self.engine.limit(**engine_limits(self.deadline))
         return self.counted["edges"]
 
     @cached_property

@@ -10,8 +10,6 @@ is the evidence; for `reachable` the sequence is the proof. What no pattern says
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any, Final
 
 from firable.analysis.question import Answer, Question, no, yes
@@ -73,16 +71,14 @@ def decide_property(space: StateSpace[Any], of: Property) -> Verdict:
     return Question(f"property.{of.name}", statement(of)).ask(space, find)
 
 
-def decide_properties(
-    space: StateSpace[Any], known: Mapping[str, Verdict] = MappingProxyType({})
-) -> tuple[Verdict, ...]:
-    """The verdicts on all properties of the net, in the order of the file; of temporal ones those that are `known`."""
-    return tuple(
-        known.get(f"property.{of.name}") or decide_temporal(space, of)
-        if isinstance(of, TemporalProperty)
-        else decide_property(space, of)
-        for of in space.net.properties
-    )
+def decide_stated(space: StateSpace[Any], of: Property | TemporalProperty) -> Verdict:
+    """The verdict `property.NAME` on one property of the net, whichever way it is stated."""
+    return decide_temporal(space, of) if isinstance(of, TemporalProperty) else decide_property(space, of)
+
+
+def decide_properties(space: StateSpace[Any]) -> tuple[Verdict, ...]:
+    """The verdicts on all properties of the net, in the order of the file."""
+    return tuple(decide_stated(space, of) for of in space.net.properties)
 
 
 def _invariant(space: StateSpace[Any], of: Property, *, violating: bool) -> Answer:
