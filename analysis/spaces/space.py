@@ -107,7 +107,7 @@ class StateSpace(Protocol[S]):
         """The same space, for questions that end with another deadline."""
         ...
 
-    def turn(self, share: float) -> AbstractContextManager[None]:
+    def turn(self, share: float, /) -> AbstractContextManager[None]:
         """Let what is asked meanwhile take at most this part of the time that is left."""
         ...
 
@@ -204,7 +204,7 @@ class StateSpace(Protocol[S]):
 class Derived(Generic[S]):
     """The second half of a state space, from the first."""
 
-    def turn(self: StateSpace[S], share: float) -> AbstractContextManager[None]:  # noqa: ARG002
+    def turn(self: StateSpace[S], _: float, /) -> AbstractContextManager[None]:
         """No limit: to pass over markings that are held one by one is short beside finding them."""
         return nullcontext()
 

@@ -66,7 +66,7 @@ class SymbolicSpace(Derived[MarkingSet]):
         return replace(self, deadline=deadline)
 
     @contextmanager
-    def turn(self, share: float) -> Iterator[None]:
+    def turn(self, share: float, /) -> Iterator[None]:
         """Let what is asked meanwhile take at most this part of the time left: one fixpoint may take all of it."""
         left = self.deadline.left_seconds
         if left is not None:

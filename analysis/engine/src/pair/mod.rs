@@ -254,7 +254,6 @@ mod tests {
     use crate::budget::unwatched;
     use crate::explore::Limits;
     use crate::marking::Dynamic;
-    use crate::net::Transition;
     use crate::paths::path_to;
     use crate::samples::{machines, random_nets};
 
@@ -375,26 +374,6 @@ mod tests {
             let again = by_two(&net, Limits { memory_bytes, ..ALL });
             assert_eq!((words(&part), part.edges), (words(&again), again.edges));
         }
-    }
-
-    #[test]
-    fn the_first_marking_in_contact_is_told_wherever_the_threads_ended() {
-        let mut transitions = machines(13, 0).transitions;
-        // So that the first are found in the level in which the threads end.
-        for k in 0..13 {
-            let busy = |i: u32| 2 * ((i + k) % 13) + 1;
-            let inputs: Vec<u32> = (0..5).map(|i| busy(2 * i)).collect();
-            transitions.push(Transition::new(&inputs, &[busy(10)], &[], &[], &[]));
-        }
-        let initial: Vec<u32> = (0..13).map(|i| 2 * i).collect();
-        let net = Net::new(26, transitions, &initial).expect("well formed");
-        let mut contacts = 0;
-        for markings in (2000..6500).step_by(100) {
-            let part = by_two(&net, Limits { markings, ..ALL });
-            contacts += part.contacts.iter().sum::<u64>();
-            witnesses_are_first(&part);
-        }
-        assert!(contacts > 0);
     }
 
     #[test]
