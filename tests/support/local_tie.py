@@ -13,7 +13,7 @@ has restarted has forgotten votes and acknowledgements, which the proof only eve
 """
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
 from dataclasses import replace
 
 from support.abstraction import Instance, differences, explain, net_structure, play, with_relations
@@ -110,26 +110,26 @@ class LocalTie:
             whole = self.structure
             left_out = {t for t in whole.things["Transition"] if (t, name) not in self.takes_part}
             left_out |= {p for p in whole.things["Place"] if whole.functions["owner"][p] != name}
-            things = {sort: tuple(t for t in those if t not in left_out) for sort, those in whole.things.items()}
-            relations = {
-                relation: frozenset(key for key in keys if left_out.isdisjoint(key))
-                for relation, keys in whole.relations.items()
-            }
-            known = self.shares[name] = replace(whole, things=things, relations=relations)
+            known = self.shares[name] = self._without(left_out)
         return known
 
     def _decided_share(self, names: frozenset[str]) -> Structure:
         """The same as far as the coordinator has to do with transitions: of places it knows nothing."""
         if (known := self.decided_shares.get(names)) is None:
-            whole = self.structure
-            left_out = {t for t in whole.things["Transition"] if t not in names} | {*whole.things["Place"]}
-            things = {sort: tuple(t for t in those if t not in left_out) for sort, those in whole.things.items()}
-            relations = {
-                relation: frozenset(key for key in keys if left_out.isdisjoint(key))
-                for relation, keys in whole.relations.items()
-            }
-            known = self.decided_shares[names] = replace(whole, things=things, relations=relations)
+            things = self.structure.things
+            left_out = {t for t in things["Transition"] if t not in names} | {*things["Place"]}
+            known = self.decided_shares[names] = self._without(left_out)
         return known
+
+    def _without(self, left_out: Set[Thing]) -> Structure:
+        """The structure but for some things and what relates them to others."""
+        whole = self.structure
+        things = {sort: tuple(t for t in those if t not in left_out) for sort, those in whole.things.items()}
+        relations = {
+            relation: frozenset(key for key in keys if left_out.isdisjoint(key))
+            for relation, keys in whole.relations.items()
+        }
+        return replace(whole, things=things, relations=relations)
 
     def _told(self, of: Structure, rounds: Iterable[int], **relations: Iterable[Key]) -> Structure:
         numbers = tuple(sorted(set(rounds)))
