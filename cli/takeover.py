@@ -109,13 +109,13 @@ def takeover(
 def _write(journals: Mapping[str, Sequence[str]], digest: str, moved: Takeover) -> None:
     """Write the journals, with their machines: aside first, so that none is there that is not whole."""
     from firable.executor.journal.journal import sync_now
-    from firable.executor.journal.memory import HOSTS, keeping, new_storage
+    from firable.executor.journal.memory import HOSTS, keeping, new_name
     from firable.executor.journal.sqlite_journal import SqliteJournal, witness_of
-    from firable.executor.links.link import Memory
+    from firable.executor.links.link import Memory, Storage
     from firable.executor.protocol.messages import Keep
     from firable.nets.writing import write_whole
 
-    storages = {file: new_storage() for file in journals}
+    storages = {file: Storage(new_name()) for file in journals}
     of = {name: storages[file] for file, names in journals.items() for name in names}
     with TemporaryDirectory() as aside:
         whole: dict[str, bytes] = {}

@@ -33,6 +33,11 @@ Storing = Callable[[], None]
 class Journal(Protocol):
     """Stable storage of the machines of one process."""
 
+    @property
+    def age(self) -> int:
+        """How often something has become durable, in all lives: what is durable now is there at every later age."""
+        ...
+
     def kept(self, machine: str) -> Mapping[str, Stored]:
         """What a machine has kept, up to the last act written; nothing for a machine that never ran."""
         ...
@@ -70,6 +75,8 @@ class MemoryJournal:
 
     def __init__(self) -> None:
         self.of: dict[str, dict[str, Stored]] = {}
+        self.age = 0
+        """Each write is durable at once, as far as anything here is."""
 
     def kept(self, machine: str) -> Mapping[str, Stored]:
         """What a machine has kept."""
@@ -77,6 +84,7 @@ class MemoryJournal:
 
     def write(self, machine: str, effects: Iterable[Effect]) -> None:
         """Take the writes of one act."""
+        self.age += 1
         of_machine = self.of.get(machine)
         if of_machine is None:
             of_machine = self.of[machine] = {}

@@ -64,6 +64,8 @@ class SqliteJournal:
         """The check value of each row in the file."""
         self.total = 0
         self.generation = 0
+        self.age = 0
+        """The generation that is durable: behind `generation` while a sync is under way."""
         self.failed: InputError | None = None
         with _failures(self.path, "opened"):
             # One thread at a time uses it, and not always the same.
@@ -71,6 +73,7 @@ class SqliteJournal:
         try:
             with _failures(self.path, "opened"):
                 self._open(digest)
+            self.age = self.generation
         except BaseException:
             self.connection.close()
             raise
@@ -127,6 +130,7 @@ class SqliteJournal:
         except InputError as error:
             self.failed = error
             raise
+        self.age = generation
 
     def close(self) -> None:
         """Let go of the file; what is not synced is lost."""

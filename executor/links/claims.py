@@ -1,10 +1,10 @@
 """Who is heard on a link without a middle: hosts claim their machines, and each answers every other one.
 
 A host claims its machines, all at once, for as long as it is there. Every other one answers it: *heard*; the *second*
-that claims one of them, and not heard before the first is gone; or *estranged*, because its storage is not the one with
-which one of them was met (`link.Memory`). Two hosts are connected when each hears the other: what one of them refuses
-the other has to know before it moves anything, and so does the person who has started it. Whoever is heard stays heard
-while it is there.
+that claims one of them, and not heard before the first is gone; or not the one that was met, because its storage is
+another one (*estranged*) or an older copy (*outdated*; `link.Memory`). Two hosts are connected when each hears the
+other: what one of them refuses the other has to know before it moves anything, and so does the person who has started
+it. Whoever is heard stays heard while it is there.
 
 Claims and answers of one host may come in any order, and so may those of several. What carries them is the link's; this
 only knows what follows from them.
@@ -21,10 +21,10 @@ from enum import StrEnum
 from typing import Final
 
 from firable.executor.links.link import (
+    Estranged,
     LinkListener,
-    Memory,
+    Storage,
     come_back_without,
-    known_otherwise,
     run_by_two,
 )
 
@@ -35,6 +35,7 @@ class Answer(StrEnum):
     HEARD = "heard"
     SECOND = "second"
     ESTRANGED = "estranged"
+    OUTDATED = "outdated"
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,18 +50,23 @@ class Said:
         """Whether the other host is heard."""
         return self.answer is Answer.HEARD
 
+    @property
+    def estranged(self) -> Estranged:
+        """Why it is not the host that was met, if the answer says so."""
+        return Estranged(self.machines, is_older=self.answer is Answer.OUTDATED)
+
 
 _JOINED: Final = "-"
 
 
-def session_of(process: str, storage: str) -> str:
+def session_of(process: str, storage: Storage) -> str:
     """The name of a process of a host with this storage: what it claims machines by."""
     return f"{process}{_JOINED}{storage}"
 
 
-def storage_of(session: str) -> str:
-    """The storage of the host that a session is of."""
-    return session.partition(_JOINED)[2]
+def storage_of(session: str) -> Storage:
+    """The storage of the host that a session is of, as it was when that began."""
+    return Storage.read(session.partition(_JOINED)[2])
 
 
 class Claims:
@@ -119,8 +125,8 @@ class Claims:
         heard = {name for other, said in self.given.items() if said.is_heard for name in self.machines[other]}
         if second := [name for name in machines if name in heard]:
             return Said(Answer.SECOND, tuple(second))
-        if estranged := Memory(storage_of(session)).met_otherwise(machines, by=self.listener.memory):
-            return Said(Answer.ESTRANGED, tuple(estranged))
+        if why := self.listener.memory.estranged(machines, storage_of(session)):
+            return Said(Answer.OUTDATED if why.is_older else Answer.ESTRANGED, why.machines)
         return Said(Answer.HEARD, machines)
 
     def _give(self, session: str, said: Said) -> None:
@@ -129,9 +135,10 @@ class Claims:
         self.given[session] = said
         self.say(session, said)
         if not said.is_heard:
-            why = run_by_two if said.answer is Answer.SECOND else come_back_without
+            is_second = said.answer is Answer.SECOND
+            problem = run_by_two(said.machines) if is_second else come_back_without(said.estranged)
             for name in self.machines[session]:
-                self.listener.refused(name, why(said.machines))
+                self.listener.refused(name, problem)
 
     def _connect(self, session: str, *, is_connected: bool) -> None:
         for name in self.machines[session]:
@@ -149,7 +156,7 @@ class Claims:
         elif self.given[session].is_heard and self.told.get(session) != taken:
             self.told[session] = taken
             for name in self.machines[session]:
-                if taken.answer is Answer.ESTRANGED:
-                    self.listener.disowned(name, known_otherwise(taken.machines, name))
-                else:
+                if taken.answer is Answer.SECOND:
                     self.listener.refused(name, run_by_two(taken.machines))
+                else:
+                    self.listener.disowned(name, taken.estranged)

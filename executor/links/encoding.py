@@ -37,6 +37,7 @@ SHAPE_BYTES_MAX: Final = 1000
 
 _NUMBER: Final = re.compile(rb":(0|-?[1-9][0-9]{0,18})(?=[,}])")
 """A number as it is written here, behind a key; in a name it may look so, too."""
+_AGE: Final = re.compile(rb"0|[1-9][0-9]{0,18}")
 
 
 class EncodingError(ValueError):
@@ -92,6 +93,29 @@ def decode(data: bytes) -> Message:
     if len(data) <= SHAPE_BYTES_MAX and [b"%d" % n for n in _FORMS[type(message)].numbers(message)] == pieces[1::2]:
         _remember(_KNOWN, shape, _remaking(message, itertools.count()))
     return message
+
+
+def pack(age: int, message: Message) -> bytes:
+    """A message and the age of its sender's storage, as they go over a line: `AGE {"Decision":...}`.
+
+    >>> from firable.executor.protocol.messages import Hello
+    >>> pack(12, Hello("robot", 0, 3, 1))[:20]
+    b'12 {"Hello":{"closed'
+    """
+    return b"%d %b" % (age, encode(message))
+
+
+def unpack(data: bytes) -> tuple[int, Message]:
+    """The age and the message of such a text; raises `EncodingError` for any bytes that `pack` does not make.
+
+    >>> from firable.executor.protocol.messages import Hello
+    >>> unpack(pack(12, Hello("robot", 0, 3, 1)))
+    (12, Hello(controller='robot', closed_below=0, seen=3, epoch=1, coordinator=''))
+    """
+    age, _, text = data.partition(b" ")
+    if not _AGE.fullmatch(age):
+        raise EncodingError("it does not begin with an age")
+    return int(age), decode(text)
 
 
 def _read(data: bytes) -> Message:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterable
 
-from firable.executor.links.link import Greeting, LinkListener, come_back_without, known_otherwise, objection
+from firable.executor.links.link import Greeting, LinkListener, come_back_without, objection
 from firable.executor.protocol.messages import Message
 
 
@@ -83,22 +83,22 @@ class InProcessLink:
         """Hand over a message; without a host for its receiver it is lost."""
         peer = self.peers.get(receiver)
         if peer is not None:
-            asyncio.get_running_loop().call_soon(self._deliver, peer, sender, receiver, message)
+            asyncio.get_running_loop().call_soon(self._deliver, peer, sender, receiver, message, self._tell().age)
 
     def meet(self, other: InProcessLink) -> None:
         """Greet another host."""
         here, there = self._tell(), other._tell()
         ours, theirs = here.memory, there.memory
         problem = objection(self.greeting, other.greeting)
-        come_back = theirs.met_otherwise(other.greeting.names, by=ours)
-        forgotten = ours.met_otherwise(self.greeting.names, by=theirs)
+        come_back = ours.estranged(other.greeting.names, theirs.storage)
+        forgotten = theirs.estranged(self.greeting.names, ours.storage)
         for name in other.greeting.names:
             if problem is not None:
                 here.refused(name, problem)
             elif come_back:
                 here.refused(name, come_back_without(come_back))
             elif forgotten:
-                here.disowned(name, known_otherwise(forgotten, name))
+                here.disowned(name, forgotten)
             else:
                 self.peers[name] = other
                 here.connected(name, theirs.storage)
@@ -109,10 +109,10 @@ class InProcessLink:
             del self.peers[name]
             self._tell().lost(name)
 
-    def _deliver(self, peer: InProcessLink, sender: str, receiver: str, message: Message) -> None:
+    def _deliver(self, peer: InProcessLink, sender: str, receiver: str, message: Message, age: int) -> None:
         # What was under way when the line was cut, or the receiver ended, is lost.
         if self.peers.get(receiver) is peer and peer.listener is not None:
-            peer.listener.arrived(sender, receiver, message)
+            peer.listener.arrived(sender, receiver, message, age)
 
     def _tell(self) -> LinkListener:
         if self.listener is None:

@@ -24,20 +24,20 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, Self
 
 import serial
 from pydantic import TypeAdapter, ValidationError
 
-from firable.executor.links.encoding import EncodingError, decode, encode
+from firable.executor.links.encoding import EncodingError, pack, unpack
 from firable.executor.links.framing import PAYLOAD_BYTES_MAX, Frame, FrameReader, Kind, pack_frame
 from firable.executor.links.link import (
     Greeting,
     LinkListener,
     Memory,
+    Storage,
     cannot_open,
     come_back_without,
-    known_otherwise,
     objection,
 )
 from firable.executor.protocol.messages import Message
@@ -61,8 +61,19 @@ class _Said:
 
     greeting: Greeting
     instance: str
-    memory: Memory = field(default_factory=Memory)
-    """Hosts of older versions say none, and are refused by their version."""
+    storage: str = ""
+    known: Mapping[str, str] = field(default_factory=dict)
+    """Hosts of older versions say neither, and are refused by their version."""
+
+    @classmethod
+    def of(cls, greeting: Greeting, instance: str, memory: Memory) -> Self:
+        """What a host with this memory says."""
+        return cls(greeting, instance, str(memory.storage), {name: str(of) for name, of in memory.known.items()})
+
+    @property
+    def memory(self) -> Memory:
+        """What a host remembers that says this."""
+        return Memory(Storage.read(self.storage), {name: Storage.read(of) for name, of in self.known.items()})
 
 
 _SAID: Final = TypeAdapter(_Said)
@@ -154,7 +165,7 @@ class SerialLink:
         peer = next((peer for peer in self.peers.values() if receiver in peer.names), None)
         if peer is None:
             return
-        line = _line(sender, receiver, encode(message))
+        line = _line(sender, receiver, pack(self._tell().age, message))
         if len(line) > PAYLOAD_BYTES_MAX:
             self._break(cannot_open(self.port, f"a message of {len(line):,} bytes is longer than a frame"))
         peer.queue.append(line)
@@ -232,7 +243,7 @@ class SerialLink:
     def _frame(self, to: int, peer: _Peer, number: int, *, greet: bool = False) -> bytes:
         """A frame for a host: the greeting as long as it is not connected, then as many messages as go into one."""
         if greet or not peer.names:
-            said = _Said(self.greeting, self.instance, self._tell().memory)
+            said = _Said.of(self.greeting, self.instance, self._tell().memory)
             payload = canonical_json(_SAID.dump_python(said, mode="json"))
             return pack_frame(Frame(to, self.own, Kind.GREETING, number, payload))
         lines: list[bytes] = []
@@ -257,8 +268,8 @@ class SerialLink:
             self.reader.damaged += 1
             return
         here, ours, theirs = self._tell(), self._tell().memory, said.memory
-        come_back = theirs.met_otherwise(said.greeting.names, by=ours)
-        forgotten = ours.met_otherwise(self.greeting.names, by=theirs)
+        come_back = ours.estranged(said.greeting.names, theirs.storage)
+        forgotten = theirs.estranged(self.greeting.names, ours.storage)
         problem = objection(self.greeting, said.greeting)
         if problem is None and come_back:
             problem = come_back_without(come_back)
@@ -274,8 +285,8 @@ class SerialLink:
                 for name in said.greeting.names:
                     if problem is not None:
                         here.refused(name, problem)
-                    else:
-                        here.disowned(name, known_otherwise(forgotten, name))
+                    elif forgotten is not None:
+                        here.disowned(name, forgotten)
         elif not peer.names:
             peer.names, peer.instance = said.greeting.names, said.instance
             for name in peer.names:
@@ -284,12 +295,12 @@ class SerialLink:
     def _message(self, peer: _Peer, line: bytes) -> None:
         try:
             sender, receiver, text = _LINE.validate_json(line)
-            message = decode(text.encode())
+            age, message = unpack(text.encode())
         except (ValidationError, EncodingError):
             self.reader.damaged += 1
             return
         if sender in peer.names and receiver in self.greeting.names:
-            self._tell().arrived(sender, receiver, message)
+            self._tell().arrived(sender, receiver, message, age)
 
     def _lose(self, peer: _Peer) -> None:
         names, peer.names, peer.instance = peer.names, (), ""

@@ -5,12 +5,12 @@ connection breaks or its lease is over. Its key says all that the greeting has t
 
     firable/VERSION/DIGEST/alive/NAMES/SESSION                     a host is there, with these machines
     firable/VERSION/DIGEST/heard/SESSION/by/SESSION/ANSWER/NAMES   it is heard by that one, or is not, and why
-    firable/VERSION/DIGEST/to/NAME/SESSION/from/NAME/SESSION       a message
+    firable/VERSION/DIGEST/to/NAME/SESSION/from/NAME/SESSION       a message, with the age of the sender's storage
 
 Keys of messages bear version, digest and both sessions, so that nothing of another bundle, or meant for the process
-that ran the machine before, is even routed. A SESSION is Zenoh's identity of it and the storage of its host (`Memory`).
-Two hosts are connected when each has answered the other that it hears it (`claims.py`): what one refuses, the other
-must know, before anything moves there. Of two hosts that claim one machine the first is heard and the other
+that ran the machine before, is even routed. A SESSION is Zenoh's identity of it and the storage of its host
+(`Storage`). Two hosts are connected when each has answered the other that it hears it (`claims.py`): what one refuses,
+the other must know, before anything moves there. Of two hosts that claim one machine the first is heard and the other
 refused; where the first is dead and nobody has noticed yet, the second takes its place when the lease is over.
 
 The *lease* is set, and not left at Zenoh's ten seconds: a frozen host is noticed after it. A killed one is noticed at
@@ -43,7 +43,7 @@ from urllib.parse import quote, unquote
 import zenoh
 
 from firable.executor.links.claims import Answer, Claims, Said, session_of
-from firable.executor.links.encoding import EncodingError, decode, encode
+from firable.executor.links.encoding import EncodingError, pack, unpack
 from firable.executor.links.lending import LendingLoop
 from firable.executor.links.link import COORDINATOR, Arrival, Greeting, LinkListener, cannot_open, objection
 from firable.executor.protocol.messages import Message
@@ -134,7 +134,7 @@ class ZenohLink:
     def send(self, sender: str, receiver: str, message: Message) -> None:
         """Publish a message; where its receiver is not connected it is lost."""
         peer = None if self.claims is None else self.claims.reached.get(receiver)
-        if self.session is None or peer is None:
+        if self.session is None or self.listener is None or peer is None:
             return
         to = (sender, receiver, peer)
         publisher = self.publishers.get(to)
@@ -146,7 +146,7 @@ class ZenohLink:
                 return
             publisher = self.session.declare_publisher(key, congestion_control=drop, express=True)
             self.publishers[to] = publisher
-        publisher.put(encode(message))
+        publisher.put(pack(self.listener.age, message))
 
     def _configuration(self) -> zenoh.Config:
         settings: dict[str, Any] = {
@@ -275,11 +275,11 @@ class ZenohLink:
         if gone or self.claims is None or self.claims.reached.get(peer) != session:
             return ()
         try:
-            message = decode(payload)
+            age, message = unpack(payload)
         except EncodingError:
             self.damaged += 1
             return ()
-        return ((peer, receiver, message),)
+        return ((peer, receiver, message, age),)
 
 
 def open_to_the_network(addresses: Sequence[str]) -> tuple[Diagnostic, ...]:

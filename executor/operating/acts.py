@@ -306,6 +306,7 @@ class Acts:
         """Have the journal keep something that is no machine's, with the next sync."""
         self.journal.write(whose, keeps)
         self.unsynced = True
+        self.wake()
 
     # What comes of it
 

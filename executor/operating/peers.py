@@ -12,10 +12,13 @@ is back is told at once.
 
 *Memory*: a host keeps by which storage it met each machine, and is refused, or refuses, where that is another (F5025).
 It keeps it before anything leaves that rests on what the machine said, and what its own storage is called before
-anybody is told that. Until it has met one of those that its machines talk to, or where they talk to nobody any other
-host, ever, nothing moves here: a journal that was mistyped or left out looks like the first start of a cell, and
+anybody is told that. How old a storage was when it was last heard of it keeps with the next repeats, and when the peer
+is lost: to write that for each message would cost more than the message, and an age of some moments ago shows any copy
+that is older than they are. Until it has met one of those that its machines talk to, or where they talk to nobody any
+other host, ever, nothing moves here: a journal that was mistyped or left out looks like the first start of a cell, and
 only the others know better. If they do before that, or before anybody was met since this host was started, it ends:
-its places of the start are wrong.
+its places of the start are wrong. If they have heard later things of this very journal, it ends whoever was met: its
+places are old, and nobody but it knows of others.
 
 Where all machines are on one host there are no others, and this does nothing.
 """
@@ -24,11 +27,12 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Final
 
 from firable.executor.journal.journal import sync_now
 from firable.executor.journal.memory import HOSTS, keeping, remembered
-from firable.executor.links.link import Arrival, Link, Memory, called
+from firable.executor.links.link import Arrival, Estranged, Link, Memory, Storage, called, known_otherwise
 from firable.executor.operating.acts import Acts
 from firable.executor.operating.waits import reached, waits
 from firable.executor.protocol.deciders import coordinators
@@ -76,9 +80,12 @@ class Peers:
         self.needed = tuple(sorted((deciding | voting) - here))
         """Those that some machine here talks to."""
         kept = acts.journal.kept(HOSTS)
-        self.memory = remembered(kept)
+        memory = remembered(kept, acts.journal.age)
+        self.storage, self.known = memory.storage, dict(memory.known)
+        self.ages: dict[str, int] = {}
+        """How old the storage of each was when it was last heard of, as far as that is not in `known`."""
         if link is not None and not kept:
-            acts.journal.write(HOSTS, keeping(self.memory))
+            acts.journal.write(HOSTS, keeping(memory))
             sync_now(acts.journal)
         self.connected_to: set[str] = set()
         self.met: set[str] = set()
@@ -90,10 +97,24 @@ class Peers:
         self.timer: asyncio.TimerHandle | None = None
 
     @property
+    def age(self) -> int:
+        """How old the storage of this host is."""
+        return self.acts.journal.age
+
+    @property
+    def memory(self) -> Memory:
+        """What this host is known by, and knows others by."""
+        for peer, age in self.ages.items():
+            if (known := self.known.get(peer)) is not None and age > known.age:
+                self.known[peer] = replace(known, age=age)
+        self.ages.clear()
+        return Memory(self.storage, dict(self.known))
+
+    @property
     def is_unmet(self) -> bool:
         """Whether nobody who could know better was ever met: then nothing moves here."""
         others = self.needed or self.names
-        return self.link is not None and bool(others) and self.memory.known.keys().isdisjoint(others)
+        return self.link is not None and bool(others) and self.known.keys().isdisjoint(others)
 
     @property
     def nobody_met(self) -> bool:
@@ -165,15 +186,23 @@ class Peers:
 
     # What the link tells
 
-    def arrived(self, sender: str, receiver: str, message: Message) -> None:
+    def arrived(self, sender: str, receiver: str, message: Message, age: int) -> None:
         """A message of another host; what its sender may not say is dropped."""
+        self._heard(sender, age)
         if self._may_say(sender, receiver, message):
             self.acts.hear(receiver, message)
 
     def arrived_together(self, messages: Sequence[Arrival]) -> None:
         """The same of several, acted upon before this returns: to wait for a turn of the loop costs more."""
-        self.acts.hear_all([(to, message) for by, to, message in messages if self._may_say(by, to, message)])
+        for sender, _, _, age in messages:
+            self._heard(sender, age)
+        self.acts.hear_all([(to, message) for by, to, message, _ in messages if self._may_say(by, to, message)])
         self.work()
+
+    def _heard(self, sender: str, age: int) -> None:
+        """Take how old the storage of a peer is by now; messages may be overtaken."""
+        if age > self.ages.get(sender, 0):
+            self.ages[sender] = age
 
     def _may_say(self, sender: str, receiver: str, message: Message) -> bool:
         way = (message.coordinator, message.controller)
@@ -182,11 +211,15 @@ class Peers:
         self.told("dropped", f"{called(sender)} sent a {type(message).__name__} that is not its to send")
         return False
 
-    def connected(self, peer: str, storage: str) -> None:
+    def connected(self, peer: str, storage: Storage) -> None:
         """A peer can be reached: what it has missed is said again."""
         if peer in self.names:
-            if peer not in self.memory.known:
-                self._remember(peer, storage)
+            was_unmet = self.is_unmet
+            if peer not in self.known or self.known[peer].life != storage.life:
+                self.known[peer] = storage
+                self._remember()
+            if was_unmet:
+                self.begin()
             self.connected_to.add(peer)
             self.met.add(peer)
             self.meeting.set()
@@ -195,17 +228,16 @@ class Peers:
             self.acts.repeat()
             self.something_new()
 
-    def _remember(self, peer: str, storage: str) -> None:
-        was_unmet = self.is_unmet
-        self.memory = Memory(self.memory.storage, {**self.memory.known, peer: storage})
+    def _remember(self) -> None:
+        """Have the journal keep what is known of others."""
         self.acts.remember(HOSTS, keeping(self.memory))
-        if was_unmet and not self.is_unmet:
-            self.begin()
 
     def lost(self, peer: str) -> None:
         """A peer can no longer be reached."""
         if peer in self.names:
             self.connected_to.discard(peer)
+            if self.ages:
+                self._remember()
             waiting = [sentence for sentence in self.waits() if reached(peer, {peer}) in sentence]
             self.told("lost", "; ".join([f"{called(peer)} is lost", *waiting]))
 
@@ -213,10 +245,14 @@ class Peers:
         """A host was refused."""
         self._turn_away(peer, f"{called(peer)} is refused", problem)
 
-    def disowned(self, peer: str, problem: Diagnostic) -> None:
-        """A host knows a machine here by another storage: where nobody has shown that this one is right, it ends."""
+    def disowned(self, peer: str, why: Estranged) -> None:
+        """A host knows machines here by another storage: where nobody has shown that this one is right, it ends.
+
+        An older copy of the same one ends in any case.
+        """
+        problem = known_otherwise(why, peer)
         self._turn_away(peer, f"{called(peer)} refuses this host", problem)
-        if self.is_unmet or not self.met:
+        if why.is_older or self.is_unmet or not self.met:
             self.end(InputError([problem]))
 
     def _turn_away(self, peer: str, what: str, problem: Diagnostic) -> None:
@@ -238,6 +274,8 @@ class Peers:
         self.timer = asyncio.get_running_loop().call_later(self.pause_seconds, self._repeat)
 
     def _repeat(self) -> None:
+        if self.ages:
+            self._remember()
         self.acts.repeat()
         self._repeat_later(min(2 * self.pause_seconds, max(REPEAT_SECONDS_MAX, self.repeat_seconds)))
 

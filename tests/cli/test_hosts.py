@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -146,7 +147,7 @@ def test_a_certificate_that_has_expired_is_refused_before_it_is_shown(
     )
 
 
-def test_a_host_that_is_started_again_without_its_journal_is_refused_with_one_clear_error(
+def test_a_host_that_is_started_again_without_its_journal_or_with_an_older_copy_is_refused_with_one_clear_error(
     bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     at = f"tcp/127.0.0.1:{free_port()}"
@@ -169,9 +170,33 @@ def test_a_host_that_is_started_again_without_its_journal_is_refused_with_one_cl
         assert refused.returncode == 2
         assert "error[F5025]: " in refused.stderr
         assert "Traceback" not in refused.stderr
+        of_robot = [path for path in tmp_path.iterdir() if path.name.startswith("robot.")]
+        assert {path.name for path in of_robot} >= {"robot.journal", "robot.journal.generation", "robot.trace"}
+        copies, lasts = tmp_path / "copies", tmp_path / "lasts"
+        for path in of_robot:
+            copies.mkdir(exist_ok=True)
+            shutil.copy(path, copies)
         done = rounds()
         processes[1] = subprocess.Popen([*with_journal, "--resume"], stderr=subprocess.DEVNULL)
         until(lambda: rounds() > done + 5, "rounds after the restart")
+        processes[1].kill()
+        processes[1].wait()
+        lasts.mkdir()
+        for path in tmp_path.glob("robot.*"):
+            path.rename(lasts / path.name)
+        for path in copies.iterdir():
+            shutil.copy(path, tmp_path)
+        refused = subprocess.run([*with_journal, "--resume"], capture_output=True, text=True, timeout=PATIENCE_SECONDS)
+        assert refused.returncode == 2
+        assert "has worked with a later state of the journal of 'robot', 'conveyor': this host has" in refused.stderr
+        assert "Traceback" not in refused.stderr
+        for path in tmp_path.glob("robot.*"):
+            path.unlink()
+        for path in lasts.iterdir():
+            path.rename(tmp_path / path.name)
+        done = rounds()
+        processes[1] = subprocess.Popen([*with_journal, "--resume"], stderr=subprocess.DEVNULL)
+        until(lambda: rounds() > done + 5, "rounds with the last journal")
     finally:
         for process in processes:
             process.send_signal(signal.SIGINT)

@@ -14,7 +14,7 @@ from firable.executor.drivers.driver import Answer as DriversAnswer
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import MemoryJournal
 from firable.executor.links.in_process import Exchange, InProcessLink
-from firable.executor.links.link import COORDINATOR, Greeting
+from firable.executor.links.link import COORDINATOR, Greeting, Storage
 from firable.executor.operating.host import Host
 from firable.executor.operating.peers import REPEAT_SECONDS, REPEAT_SECONDS_MAX
 from firable.executor.operating.recorder import Recorder
@@ -137,9 +137,9 @@ def test_what_a_host_may_not_say_is_dropped(tmp_path: Path) -> None:
         centre, robot = cell.hosts[CENTRE], cell.hosts[ROBOT]
         before = dict(centre.coordinators[COORDINATOR].seen)
         readiness = robot.controllers["robot"].above[COORDINATOR].readiness
-        centre.peers.arrived("mc", COORDINATOR, Vote("robot", 0, frozenset({"G2"}), readiness))
-        robot.peers.arrived("mc", "robot", Decision("robot", 0, "G2", 0, 0))
-        robot.peers.arrived(COORDINATOR, "robot", Decision("mc", 0, "G2", 0, 0))
+        centre.peers.arrived("mc", COORDINATOR, Vote("robot", 0, frozenset({"G2"}), readiness), 0)
+        robot.peers.arrived("mc", "robot", Decision("robot", 0, "G2", 0, 0), 0)
+        robot.peers.arrived(COORDINATOR, "robot", Decision("mc", 0, "G2", 0, 0), 0)
         assert [kind for kind, _ in cell.told].count("dropped") == 3
         assert not centre.acts.posted
         assert not robot.acts.posted
@@ -245,7 +245,7 @@ def test_a_host_that_is_stopping_promises_nothing_more(tmp_path: Path) -> None:
         host, controller = cell.hosts[ROBOT], cell.hosts[ROBOT].controllers["robot"]
         name = next(n for n, part in controller.parts.items() if part.enabled(controller.word))
         host.stop()
-        host.peers.arrived(COORDINATOR, "robot", VoteRequest("robot", 7 << 40, (name,), 0, -1))
+        host.peers.arrived(COORDINATOR, "robot", VoteRequest("robot", 7 << 40, (name,), 0, -1), 0)
         await asyncio.sleep(0.1)
         assert not any(promise.promised for promise in controller.promises.values())
         await cell.stop()
@@ -343,10 +343,10 @@ def test_a_command_that_is_decided_when_the_driver_fails_is_asked_after_at_the_r
         host = Host(decomposition, driver, recorder, machines=("a",), link=link, journal=journal)
         ending = asyncio.create_task(host.main())
         await asyncio.sleep(0.05)
-        host.peers.connected("", "of another host")
-        host.peers.arrived("", "a", VoteRequest("a", 0, ("hand",), 0, -1))
+        host.peers.connected("", Storage("of another host"))
+        host.peers.arrived("", "a", VoteRequest("a", 0, ("hand",), 0, -1), 0)
         await asyncio.sleep(0.05)
-        host.peers.arrived("", "a", Decision("a", 0, "hand", 0, -1))
+        host.peers.arrived("", "a", Decision("a", 0, "hand", 0, -1), 0)
         host.driver_fault("A", "failed")
         assert (await ending).state is State.FAULT
         assert driver.sent == 0

@@ -262,8 +262,8 @@ def test_what_another_coordinator_says_in_its_name_is_dropped(tmp_path: Path) ->
         robots = cell.hosts["robot_a", "machine_a"]
         await asyncio.sleep(0.5)
         number = 1 + 3 * 1000
-        robots.peers.arrived(CELL_A, "machine_a", VoteRequest("machine_a", number, ("taken_a",), 0, -1, 0, CELL_A))
-        robots.peers.arrived(TOP, "machine_a", VoteRequest("machine_a", number, ("taken_a",), 0, -1, 0, CELL_A))
+        robots.peers.arrived(CELL_A, "machine_a", VoteRequest("machine_a", number, ("taken_a",), 0, -1, 0, CELL_A), 0)
+        robots.peers.arrived(TOP, "machine_a", VoteRequest("machine_a", number, ("taken_a",), 0, -1, 0, CELL_A), 0)
         assert [sentence for kind, sentence in cell.told if kind == "dropped"] == [
             "the coordinator sent a VoteRequest that is not its to send"
         ]

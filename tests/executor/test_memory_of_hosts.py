@@ -2,22 +2,28 @@
 
 import asyncio
 from contextlib import closing
+from copy import deepcopy
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
+from support.examples import examples
 from support.hosts import ONE_EACH, Cell
 
 from firable.decompose import split
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import Journal, MemoryJournal
-from firable.executor.journal.memory import HOSTS, keeping
+from firable.executor.journal.memory import HOSTS, keeping, remembered
 from firable.executor.journal.sqlite_journal import SqliteJournal
 from firable.executor.links.in_process import Exchange, InProcessLink
-from firable.executor.links.link import COORDINATOR, Greeting, Memory
+from firable.executor.links.link import COORDINATOR, Greeting, Memory, Storage
 from firable.executor.operating.host import Host
-from firable.executor.operating.recorder import Recorder
+from firable.executor.operating.recorder import KEY, TRACE, Recorder
 from firable.executor.operating.situation import Situation, State
+from firable.executor.protocol.messages import Readiness, Report
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.net import Place
 from firable.nets.text import parse_net
@@ -111,6 +117,167 @@ def test_a_host_without_its_journal_ends_and_the_others_go_on_when_it_has_it_aga
         assert cell.replayed().firings == cell.firings() > before + 10
 
     run_in_virtual_time(main())
+
+
+@pytest.mark.parametrize("lost", ONE_EACH, ids=lambda machines: machines[0] or "coordinator")
+@pytest.mark.parametrize("lives", [0, 1], ids=["in the life in which it is lost", "in an earlier life"])
+@pytest.mark.parametrize("all_restart", [False, True], ids=["others live on", "others are started anew, too"])
+def test_a_host_with_an_older_copy_of_its_journal_ends_and_the_others_go_on_when_it_has_the_last(
+    lost: tuple[str, ...], lives: int, all_restart: bool, tmp_path: Path
+) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        await asyncio.sleep(2.3)
+        copy = deepcopy(cell.journals[lost])
+        for _ in range(lives):
+            await cell.kill(lost)
+            cell.start(lost, resume=True)
+        await asyncio.sleep(9)
+        await cell.kill(lost)
+        await asyncio.sleep(0.1)
+        if all_restart:
+            for machines in cell.journals:
+                if machines != lost:
+                    await cell.kill(machines)
+                    cell.start(machines, resume=True)
+        trace, kept = cell.path(lost).read_bytes(), cell.journals[lost]
+        cell.journals[lost] = copy
+        before = sum(Recorder(cell.net, "", None, copy.kept(TRACE).get(KEY), lost).firings.values())
+        cell.start(lost, resume=True)
+        problem = await refusal(cell.tasks[lost])
+        assert problem.code == "F5025"
+        assert "this host has an older copy" in problem.message
+        assert sum(cell.hosts[lost].recorder.firings.values()) == before
+        assert any("came back without the last that was kept" in told for kind, told in cell.told if kind == "refused")
+        cell.path(lost).write_bytes(trace)
+        cell.journals[lost] = kept
+        before = cell.firings()
+        cell.start(lost, resume=True)
+        await asyncio.sleep(30)
+        await cell.stop()
+        assert cell.replayed().firings == cell.firings() > before + 10
+
+    run_in_virtual_time(main())
+
+
+def test_a_host_with_an_older_copy_ends_also_where_others_were_met_that_have_heard_nothing_later() -> None:
+    async def main() -> None:
+        hosts, memory, journal = Hosts(), MemoryJournal(), MemoryJournal()
+        journal.write(HOSTS, keeping(Memory(Storage("of a"), {COORDINATOR: Storage("of c")})))
+        memory.write(HOSTS, keeping(Memory(Storage("of c"), {"a": Storage("of a", "before", 1000)})))
+        run = hosts.host(("a",), journal)
+        ending = asyncio.create_task(run.main())
+        tasks = [asyncio.create_task(hosts.host(("b",), MemoryJournal()).main())]
+        await asyncio.sleep(3)
+        assert run.peers.met == {"b"}
+        tasks.append(asyncio.create_task(hosts.host((COORDINATOR,), memory).main()))
+        problem = await refusal(ending)
+        assert "the coordinator has worked with a later state of the journal of 'a'" in problem.message
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks)
+
+    run_in_virtual_time(main())
+
+
+def test_what_was_heard_of_a_storage_is_kept_while_all_is_well_and_when_its_host_is_lost(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path)
+
+        def kept() -> Storage:
+            return remembered(cell.journals[CENTRE].kept(HOSTS), 0).known["robot"]
+
+        await asyncio.sleep(0.1)
+        first = kept()
+        await asyncio.sleep(9)
+        later = kept()
+        assert later.age > first.age
+        assert (later.name, later.life) == (first.name, first.life)
+        peers = cell.hosts[CENTRE].peers
+        while "robot" not in peers.ages:
+            await asyncio.sleep(0.01)
+        age = peers.ages["robot"]
+        assert kept().age < age <= cell.hosts[ROBOT].peers.age
+        cell.exchange.cut(cell.links[ROBOT])
+        assert kept() == replace(later, age=age)
+        cell.exchange.mend(cell.links[ROBOT])
+        await cell.kill(ROBOT)
+        cell.start(ROBOT, resume=True)
+        await asyncio.sleep(9)
+        assert kept().life != first.life
+        assert kept().age > age
+        await cell.stop()
+
+    run_in_virtual_time(main())
+
+
+def test_an_age_that_was_overtaken_takes_nothing_back() -> None:
+    async def main() -> None:
+        peers = Hosts().host((COORDINATOR,), MemoryJournal()).peers
+        peers.connected("a", Storage("of a", "first", 2))
+        for ages in ((3, 7, 5), (6,)):
+            for age in ages:
+                peers.arrived("a", COORDINATOR, Report("a", Readiness(0, frozenset())), age)
+            assert peers.memory.known["a"] == Storage("of a", "first", 7)
+
+    asyncio.run(main())
+
+
+class Journals(RuleBasedStateMachine):
+    """A journal, its copies, and another host that hears how old it is; what it holds is told by marks.
+
+    A host is refused exactly where something has been heard that its journal does not hold; copies of what was given up
+    for another copy, unheard, are left out: they are of another journal with the same count.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.names = iter(range(10**9))
+        self.holds: list[int] = []
+        self.copies: list[list[int]] = []
+        self.heard: set[int] = set()
+        self.other = Memory()
+        self.began = Storage("of a", "first", 0)
+
+    def is_refused(self, storage: Storage) -> bool:
+        return self.other.estranged(["a"], storage) is not None
+
+    @rule()
+    def something_becomes_durable(self) -> None:
+        self.holds.append(next(self.names))
+
+    @rule()
+    def a_message_is_heard(self) -> None:
+        self.heard |= set(self.holds)
+        self.other = Memory(known={"a": replace(self.began, age=len(self.holds))})
+
+    @rule()
+    def the_line_is_cut_and_mended(self) -> None:
+        assert not self.is_refused(self.began)
+
+    @rule()
+    def a_copy_is_made(self) -> None:
+        self.copies.append(list(self.holds))
+
+    @rule()
+    def it_is_started_anew(self) -> None:
+        storage = Storage("of a", f"life {next(self.names)}", len(self.holds))
+        assert not self.is_refused(storage)
+        self.began = storage
+
+    @precondition(lambda self: self.copies)
+    @rule(data=st.data())
+    def it_is_started_with_a_copy(self, data: st.DataObject) -> None:
+        copy = data.draw(st.sampled_from(self.copies))
+        storage = Storage("of a", f"life {next(self.names)}", len(copy))
+        assert self.is_refused(storage) == (not self.heard <= set(copy))
+        if not self.is_refused(storage):
+            self.holds, self.began = list(copy), storage
+            self.copies = [one for one in self.copies if one == copy[: len(one)]]
+
+
+TestJournals = Journals.TestCase
+TestJournals.settings = examples(100)
 
 
 def test_a_host_that_begins_anew_moves_nothing_before_it_has_met_another() -> None:
@@ -229,8 +396,12 @@ def test_what_a_host_remembers_outlives_it_in_its_journal(tmp_path: Path) -> Non
         journal.close()
         again = SqliteJournal(tmp_path / "a.journal", "d", ("a",))
         memory = hosts.host(("a",), again).peers.memory
-        assert memory == run.peers.memory
-        assert memory.known == dict.fromkeys(("b", COORDINATOR), other.peers.memory.storage)
+        assert memory.known == run.peers.memory.known
+        assert memory.storage.name == run.peers.memory.storage.name
+        assert memory.storage.life != run.peers.memory.storage.life, "a new life"
+        assert memory.storage.age == again.age >= run.peers.age
+        storages = {(known.name, known.life) for known in memory.known.values()}
+        assert storages == {(other.peers.memory.storage.name, other.peers.memory.storage.life)}
         again.close()
 
     asyncio.run(main())
@@ -240,9 +411,9 @@ def test_what_a_journal_is_called_is_stored_before_anybody_is_told(tmp_path: Pat
     """Or a host that is killed as soon as it was met would come back by another name, and be refused."""
     path = tmp_path / "a.journal"
     with closing(SqliteJournal(path, "d", ("a",))) as journal:
-        called = Hosts().host(("a",), journal).peers.memory.storage  # and here it is killed
+        called = Hosts().host(("a",), journal).peers.memory.storage.name  # and here it is killed
     with closing(SqliteJournal(path, "d", ("a",))) as journal:
-        assert Hosts().host(("a",), journal).peers.memory.storage == called
+        assert Hosts().host(("a",), journal).peers.memory.storage.name == called
 
 
 def test_a_host_whose_machines_talk_to_nobody_moves_nothing_either_before_another_host_is_met() -> None:
@@ -272,7 +443,7 @@ def test_a_host_whose_machines_talk_to_nobody_moves_nothing_either_before_anothe
 def test_a_host_that_has_met_only_those_who_cannot_know_it_ends_when_one_does() -> None:
     async def main() -> None:
         hosts, memory = Hosts(), MemoryJournal()
-        memory.write(HOSTS, keeping(Memory("of the coordinator", {"a": "of another journal"})))
+        memory.write(HOSTS, keeping(Memory(Storage("of the coordinator"), {"a": Storage("of another journal")})))
         run = hosts.host(("a",), MemoryJournal())
         ending = asyncio.create_task(run.main())
         tasks = [asyncio.create_task(hosts.host(("b",), MemoryJournal()).main())]

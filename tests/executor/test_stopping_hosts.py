@@ -13,7 +13,7 @@ from support.hosts import Cell, ended_within
 
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.dry_run import DryRunDriver
-from firable.executor.links.link import COORDINATOR
+from firable.executor.links.link import COORDINATOR, Arrival
 from firable.executor.operating.situation import Situation, State
 from firable.executor.operating.stopping import SETTLE_SECONDS
 from firable.executor.protocol.messages import Message
@@ -45,7 +45,7 @@ class Frozen:
         self.link, self.exchange = cell.links[machines], cell.exchange
         assert self.link.listener is not None
         self.listener, self.send = self.link.listener, self.link.send
-        self.heard: list[tuple[str, str, Message]] = []
+        self.heard: list[Arrival] = []
         self.said: list[tuple[str, str, Message]] = []
         self.link.listener = self
         self.standing = patch.object(self.link, "send", lambda *said: self.said.append(said))

@@ -24,7 +24,7 @@ from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.drivers.far_side.machine import ROLES
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.links.in_process import Exchange, InProcessLink
-from firable.executor.links.link import COORDINATOR, Greeting, Memory
+from firable.executor.links.link import COORDINATOR, Greeting, Memory, Storage
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import KEY, TRACE, Recorder
 from firable.executor.operating.situation import State
@@ -83,7 +83,7 @@ def whole(driver: Queue, journal: Journal, *, resume: bool = False) -> Host:
 def among_others(driver: Queue, journal: Journal, *, resume: bool = False) -> Host:
     exchange = Exchange()
     another = InProcessLink(exchange, Greeting("d", (COORDINATOR,)))
-    another.listener = Heard(memory=Memory("of another host"))  # without another one nothing moves
+    another.listener = Heard(memory=Memory(Storage("of another host")))  # without another one nothing moves
     exchange.enter(another)
     link, recorder = InProcessLink(exchange, Greeting("d", ("a",))), Recorder(NET, "", None, None, ("a",))
     return Host(SPLIT, driver, recorder, machines=("a",), link=link, journal=journal, overdue_seconds=30, resume=resume)

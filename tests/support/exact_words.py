@@ -26,7 +26,7 @@ from firable.cli.view.moment import moment_of
 from firable.decompose.protocol.exploring import explore_protocol
 from firable.decompose.protocol.wrong import WRONG, example
 from firable.executor.journal.sqlite_journal import SqliteJournal
-from firable.executor.links.link import Greeting, come_back_without, objection
+from firable.executor.links.link import Estranged, Greeting, come_back_without, objection
 from firable.executor.links.zenoh_link import open_to_the_network
 from firable.executor.operating.control import Endpoint, listening
 from firable.nets.catalogue import catalogue_net
@@ -97,7 +97,7 @@ def a_host_with_another_bundle(_: Path) -> str:
 
 
 def a_host_without_its_journal(_: Path) -> str:
-    return str(come_back_without(["robot"]))
+    return str(come_back_without(Estranged(("robot",), is_older=False)))
 
 
 def an_address_without_tls(_: Path) -> str:

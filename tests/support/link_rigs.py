@@ -11,7 +11,16 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from firable.executor.links.in_process import Exchange, InProcessLink
-from firable.executor.links.link import COORDINATOR, Arrival, Greeting, Link, Memory
+from firable.executor.links.link import (
+    COORDINATOR,
+    Arrival,
+    Estranged,
+    Greeting,
+    Link,
+    Memory,
+    Storage,
+    known_otherwise,
+)
 from firable.executor.links.serial_line import MASTER, SerialLink, addresses_on_a_line
 from firable.executor.links.zenoh_link import ZenohLink
 from firable.executor.protocol.messages import Message
@@ -27,20 +36,27 @@ class Heard:
 
     told: list[tuple[str, str]] = field(default_factory=list)
     messages: list[tuple[str, str, Message]] = field(default_factory=list)
+    ages: list[int] = field(default_factory=list)
+    """Those of the messages."""
     problems: list[Diagnostic] = field(default_factory=list)
     waiters: list[asyncio.Future[None]] = field(default_factory=list)
-    memory: Memory = field(default_factory=lambda: Memory(os.urandom(4).hex()))
+    memory: Memory = field(default_factory=lambda: Memory(Storage(os.urandom(4).hex())))
+
+    @property
+    def age(self) -> int:
+        return self.memory.storage.age
 
     def arrived_together(self, messages: Sequence[Arrival]) -> None:
         """The same of several."""
         for message in messages:
             self.arrived(*message)
 
-    def arrived(self, sender: str, receiver: str, message: Message) -> None:
+    def arrived(self, sender: str, receiver: str, message: Message, age: int) -> None:
         self.messages.append((sender, receiver, message))
+        self.ages.append(age)
         self._wake()
 
-    def connected(self, peer: str, storage: str) -> None:
+    def connected(self, peer: str, storage: Storage) -> None:
         self.memory = Memory(self.memory.storage, {peer: storage, **self.memory.known})
         self.told.append(("connected", peer))
         self._wake()
@@ -54,9 +70,9 @@ class Heard:
         self.problems.append(problem)
         self._wake()
 
-    def disowned(self, peer: str, problem: Diagnostic) -> None:
+    def disowned(self, peer: str, why: Estranged) -> None:
         self.told.append(("disowned", peer))
-        self.problems.append(problem)
+        self.problems.append(known_otherwise(why, peer))
         self._wake()
 
     async def until(self, condition: Callable[[], bool]) -> None:

@@ -94,6 +94,30 @@ def test_what_is_synced_is_kept_as_a_dictionary_would(
     again.close()
 
 
+def test_a_journal_is_as_old_as_what_is_durable_of_it_and_older_with_each_sync(tmp_path: Path) -> None:
+    """Else a host would tell of what a crash may still take, and be refused by whom it has told."""
+    journal = sqlite(tmp_path)
+    assert journal.age == 0
+    journal.write("a", [Keep("word", "1")])
+    storing = journal.sync()
+    assert storing is not None
+    assert journal.age == 0
+    before = sqlite(crashed(journal, tmp_path / "before"))
+    assert (before.age, before.kept("a")) == (0, {})
+    storing()
+    assert journal.age == 1
+    assert sqlite(crashed(journal, tmp_path / "after")).age == 1
+    sync_now(journal)
+    assert journal.age == 1, "nothing was written"
+    journal.write("b", [Keep("word", "1")])
+    sync_now(journal)
+    assert journal.age == 2
+    journal.connection.close()
+    journal.write("b", [Keep("word", "2")])
+    assert refused(lambda: sync_now(journal))[0] in {"F5032", "F5034"}
+    assert journal.age == 2
+
+
 def test_fresh_journal_has_kept_nothing(opener: Opener) -> None:
     assert opener().kept("a") == {}
 

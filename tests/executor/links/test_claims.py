@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from collections import deque
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 
 from hypothesis import given
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 from support.examples import examples
 
 from firable.executor.links.claims import Claims, Said, session_of
-from firable.executor.links.link import Arrival, Memory
+from firable.executor.links.link import Arrival, Estranged, Memory, Storage, known_otherwise
 from firable.executor.protocol.messages import Message
 from firable.nets.diagnostics import Diagnostic
 
@@ -27,7 +28,7 @@ class Party:
         self.memory = memory
         self.before = memory
         """What it remembered when it was started."""
-        self.connected_to: dict[str, str] = {}
+        self.connected_to: dict[str, Storage] = {}
         self.was_connected: list[str] = []
         self.disowned_by: set[str] = set()
         self.refusals: list[tuple[str, Diagnostic]] = []
@@ -38,13 +39,19 @@ class Party:
 
     def arrived_together(self, messages: Sequence[Arrival]) -> None: ...
 
-    def arrived(self, sender: str, receiver: str, message: Message) -> None: ...
+    def arrived(self, sender: str, receiver: str, message: Message, age: int) -> None: ...
 
-    def connected(self, peer: str, storage: str) -> None:
+    @property
+    def age(self) -> int:
+        return self.memory.storage.age
+
+    def connected(self, peer: str, storage: Storage) -> None:
         assert peer not in self.connected_to
         self.connected_to[peer] = storage
         self.was_connected.append(peer)
-        self.memory = Memory(self.memory.storage, {peer: storage, **self.memory.known})
+        known = self.memory.known.get(peer)
+        if known is None or known.life != storage.life:
+            self.memory = Memory(self.memory.storage, {**self.memory.known, peer: storage})
 
     def lost(self, peer: str) -> None:
         del self.connected_to[peer]
@@ -52,8 +59,8 @@ class Party:
     def refused(self, peer: str, problem: Diagnostic) -> None:
         self.refusals.append((peer, problem))
 
-    def disowned(self, peer: str, problem: Diagnostic) -> None:
-        self.refusals.append((peer, problem))
+    def disowned(self, peer: str, why: Estranged) -> None:
+        self.refusals.append((peer, known_otherwise(why, peer)))
         self.disowned_by.add(peer)
 
 
@@ -115,39 +122,46 @@ class Wires:
 
 
 def fit(one: Party, other: Party) -> bool:
-    """Whether neither has met the other by another storage, and they do not run the same machine."""
-    met = other.memory.met_otherwise(other.names, by=one.memory) or one.memory.met_otherwise(one.names, by=other.memory)
-    return not met and not set(one.names) & set(other.names)
+    """Whether neither knows the other by another or a later storage, and they do not run the same machine."""
+    return not knows_otherwise(one, other) and not knows_otherwise(other, one) and not set(one.names) & set(other.names)
+
+
+def knows_otherwise(one: Party, other: Party, *, when_started: bool = False) -> bool:
+    """Whether what one remembers is against another one."""
+    memory = one.before if when_started else one.memory
+    return memory.estranged(other.names, other.before.storage) is not None
 
 
 DICE = st.integers(0, 10**6).map(random.Random)
-MEMORIES = st.lists(
-    st.dictionaries(st.sampled_from(["a", "b", "c", "d"]), st.sampled_from(["s0", "s1", "s2"])), min_size=3, max_size=3
-)
+NAMES = st.sampled_from(["s0", "s1", "s2"])
+STORAGES = st.builds(Storage, NAMES, st.sampled_from(["earlier", "latest"]), st.integers(0, 2))
+MEMORIES = st.lists(st.dictionaries(st.sampled_from(["a", "b", "c", "d"]), STORAGES), min_size=3, max_size=3)
 
 
 @examples(200)
 @given(DICE, MEMORIES, st.lists(st.integers(0, 8), min_size=1, max_size=6))
 def test_hosts_of_different_machines_end_connected_exactly_if_none_knows_another_otherwise(
-    dice: random.Random, memories: list[dict[str, str]], pauses: list[int]
+    dice: random.Random, memories: list[dict[str, Storage]], pauses: list[int]
 ) -> None:
     """Whatever is delivered first, and however often they were ended and started again meanwhile."""
     wires, all_names = Wires(dice), (("a", "b"), ("c",), ("d",))
-    now = [wires.start(names, Memory(f"s{i}", memories[i])) for i, names in enumerate(all_names)]
+    storages = [Storage(f"s{i}", "latest", 1) for i in range(3)]
+    now = [wires.start(names, Memory(storages[i], memories[i])) for i, names in enumerate(all_names)]
     for pause in pauses:
         wires.deliver(pause)
         number = dice.randrange(3)
         wires.end(now[number])
         wires.deliver(dice.randrange(4))
-        now[number] = wires.start(now[number].names, now[number].memory)
+        storage = replace(storages[number], life=f"life {wires.started}", age=dice.randrange(3))
+        now[number] = wires.start(now[number].names, replace(now[number].memory, storage=storage))
     wires.all_delivered()
     for one in now:
         for other in now:
             if one is not other:
                 is_connected = {name in one.connected_to for name in other.names}
                 assert is_connected == {fit(one, other)}
-                estranged = bool(one.before.met_otherwise(one.names, by=other.before))
-                if estranged and not other.before.met_otherwise(other.names, by=one.before):
+                estranged = knows_otherwise(other, one, when_started=True)
+                if estranged and not knows_otherwise(one, other, when_started=True):
                     assert one.disowned_by >= set(other.names)
                     assert other.refusals
 
@@ -159,8 +173,8 @@ def test_of_two_hosts_with_a_machine_in_common_one_is_connected_and_the_other_wh
 ) -> None:
     """And nothing of the other one is connected, nor remembered, before."""
     wires = Wires(dice)
-    centre = wires.start(("c",), Memory("s0"))
-    one, both = wires.start(("a",), Memory("s1")), wires.start(("a", "b"), Memory("s1"))
+    centre = wires.start(("c",), Memory(Storage("s0")))
+    one, both = wires.start(("a",), Memory(Storage("s1"))), wires.start(("a", "b"), Memory(Storage("s1")))
     wires.deliver(most)
     wires.all_delivered()
     (heard,) = [party for party in (one, both) if party.connected_to]
@@ -180,10 +194,10 @@ def test_of_two_hosts_with_a_machine_in_common_one_is_connected_and_the_other_wh
 @given(DICE)
 def test_a_host_that_is_refused_for_one_machine_is_never_known_by_another(dice: random.Random) -> None:
     wires = Wires(dice)
-    centre = wires.start(("c",), Memory("s0", {"b": "s1"}))
-    stranger = wires.start(("a", "b"), Memory("s2"))
+    centre = wires.start(("c",), Memory(Storage("s0"), {"b": Storage("s1")}))
+    stranger = wires.start(("a", "b"), Memory(Storage("s2")))
     wires.all_delivered()
     assert not centre.was_connected
     assert not stranger.was_connected
-    assert centre.memory.known == {"b": "s1"}
+    assert centre.memory.known == {"b": Storage("s1")}
     assert stranger.disowned_by == {"c"}

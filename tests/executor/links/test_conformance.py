@@ -10,7 +10,7 @@ import pytest
 from support.link_rigs import PATIENCE_SECONDS, Heard, Rig, in_process, over_a_serial_line, over_zenoh, running
 
 from firable.executor.links.lending import LendingLoop
-from firable.executor.links.link import COORDINATOR, Greeting, Link, Memory
+from firable.executor.links.link import COORDINATOR, Greeting, Link, Memory, Storage
 from firable.executor.protocol.messages import Acknowledgement, Decision, Message, Readiness, Report, Vote, VoteRequest
 
 Make = Callable[[], AbstractAsyncContextManager[Rig]]
@@ -127,7 +127,7 @@ class TestLink:
             async with make() as rig:
                 here = rig.link(CENTRE)
                 async with asyncio.timeout(PATIENCE_SECONDS), running(here) as centre:
-                    memory = Memory("r1")
+                    memory = Memory(Storage("r1"))
                     for _ in range(2):
                         there = rig.link(ROBOT)
                         async with running(there, memory) as robot:
@@ -144,11 +144,11 @@ class TestLink:
             async with make() as rig:
                 here = rig.link(CENTRE)
                 async with asyncio.timeout(PATIENCE_SECONDS), running(here) as centre:
-                    async with running(rig.link(ROBOT), Memory("r1")):
+                    async with running(rig.link(ROBOT), Memory(Storage("r1"))):
                         await centre.until_told(("connected", "robot"))
                     await centre.until_told(("lost", "robot"))
                     there = rig.link(ROBOT)
-                    async with running(there, Memory("r2")) as robot:
+                    async with running(there, Memory(Storage("r2"))) as robot:
                         await centre.until_told(("refused", "robot"))
                         await robot.until_told(("disowned", COORDINATOR))
                         there.send("robot", COORDINATOR, TO_COORDINATOR[0])
@@ -160,8 +160,62 @@ class TestLink:
                         assert not robot.memory.known
                     assert [problem.code for problem in centre.problems] == ["F5025"]
                     assert centre.told.count(("connected", "robot")) == 1
-                    async with running(rig.link(ROBOT), Memory("r1")):
+                    async with running(rig.link(ROBOT), Memory(Storage("r1"))):
                         await centre.until(lambda: centre.told.count(("connected", "robot")) == 2)
+
+        run(make, main())
+
+    def test_a_message_bears_how_often_the_storage_of_its_sender_was_made_durable(self, make: Make) -> None:
+        async def main() -> None:
+            async with make() as rig:
+                there = rig.link(ROBOT)
+                memory = Memory(Storage("r1", "first", 3))
+                async with running(rig.link(CENTRE)) as centre, running(there, memory) as robot:
+                    await robot.until_told(("connected", COORDINATOR))
+                    await deliver(there, centre, "robot", COORDINATOR, TO_COORDINATOR[:1])
+                    robot.memory = replace(robot.memory, storage=Storage("r1", "first", 1 << 40))
+                    await deliver(there, centre, "robot", COORDINATOR, TO_COORDINATOR[1:2])
+                assert set(centre.ages) == {3, 1 << 40}
+                assert centre.memory.known["robot"] == Storage("r1", "first", 3)
+
+        run(make, main())
+
+    def test_a_host_that_comes_back_with_an_older_copy_is_refused_and_one_with_all_that_was_heard_is_not(
+        self, make: Make
+    ) -> None:
+        async def main() -> None:
+            async with make() as rig:
+                memory = Memory(Storage("c1"), {"robot": Storage("r1", "first", 7)})
+                async with running(rig.link(CENTRE), memory) as centre:
+                    there = rig.link(ROBOT)
+                    async with running(there, Memory(Storage("r1", "second", 6))) as robot:
+                        await centre.until_told(("refused", "robot"))
+                        await robot.until_told(("disowned", COORDINATOR))
+                        there.send("robot", COORDINATOR, TO_COORDINATOR[0])
+                        await asyncio.sleep(0.1)
+                        assert not centre.messages
+                        assert ("connected", COORDINATOR) not in robot.told
+                        assert "an older copy" in robot.problems[0].message
+                    assert "an older copy" in centre.problems[0].message
+                    async with running(rig.link(ROBOT), Memory(Storage("r1", "third", 7))):
+                        await centre.until_told(("connected", "robot"))
+
+        run(make, main())
+
+    def test_within_a_life_the_age_that_a_host_began_with_is_none_against_it(self, make: Make) -> None:
+        async def main() -> None:
+            async with make() as rig:
+                memory = Memory(Storage("r1", "first", 1))
+                async with running(rig.link(CENTRE)) as centre, running(rig.link(ROBOT), memory) as robot:
+                    await centre.until_told(("connected", "robot"))
+                    await robot.until_told(("connected", COORDINATOR))
+                    centre.memory = replace(centre.memory, known={"robot": Storage("r1", "first", 9)})
+                    rig.cut()
+                    await robot.until_told(("lost", COORDINATOR))
+                    await centre.until_told(("lost", "robot"))
+                    rig.mend()
+                    await centre.until(lambda: centre.told[-1] == ("connected", "robot"))
+                    assert not centre.problems
 
         run(make, main())
 
@@ -169,8 +223,11 @@ class TestLink:
         async def main() -> None:
             async with make() as rig:
                 both = rig.link(replace(ROBOT, names=("system", "robot")))
-                centre_knows = Memory("c1", {"system": "r1"})
-                async with running(rig.link(CENTRE), centre_knows) as centre, running(both, Memory("r2")) as stranger:
+                centre_knows = Memory(Storage("c1"), {"system": Storage("r1")})
+                async with (
+                    running(rig.link(CENTRE), centre_knows) as centre,
+                    running(both, Memory(Storage("r2"))) as stranger,
+                ):
                     await centre.until_told(("refused", "system"))
                     await stranger.until_told(("disowned", COORDINATOR))
                     await asyncio.sleep(0.2)
@@ -187,7 +244,7 @@ class TestLink:
             async with make() as rig:
                 there = rig.link(ROBOT)
                 async with asyncio.timeout(PATIENCE_SECONDS), running(there) as robot:
-                    memory = Memory("c1")
+                    memory = Memory(Storage("c1"))
                     for _ in range(2):
                         here = rig.link(CENTRE)
                         async with running(here, memory) as centre:

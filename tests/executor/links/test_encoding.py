@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.examples import examples
 
-from firable.executor.links.encoding import KINDS, MESSAGE_BYTES_MAX, EncodingError, _Form, decode, encode
+from firable.executor.links.encoding import KINDS, MESSAGE_BYTES_MAX, EncodingError, _Form, decode, encode, pack, unpack
 from firable.executor.links.link import PROTOCOL_VERSION
 from firable.executor.protocol import messages
 from firable.executor.protocol.messages import Decision, Message, Readiness, ToController, ToCoordinator
@@ -141,6 +141,15 @@ def test_a_set_in_another_order_or_with_a_doubled_entry_is_refused() -> None:
             decode(text.replace(b'"promised":["G1","G2"]', other))
 
 
+def test_an_age_before_a_message_has_one_spelling_too() -> None:
+    text = encode(Decision("robot", 77, None, 0, -1))
+    for age in (0, 9, 10**18):
+        assert unpack(pack(age, Decision("robot", 77, None, 0, -1))) == (age, Decision("robot", 77, None, 0, -1))
+    for before in (b"", b" ", b"01 ", b"-1 ", b"+1 ", b"1_0 ", b"1", b"1  ", b"9" * 20 + b" ", "\u0661 ".encode()):
+        with pytest.raises(EncodingError):
+            unpack(before + text)
+
+
 @dataclass(frozen=True)
 class Odd:
     """A message as there must be none."""
@@ -153,10 +162,16 @@ def test_a_message_with_a_field_that_has_no_one_spelling_is_refused_when_the_pro
         _Form(Odd)
 
 
-SHAPES = {2: "f8449b1cb1bf4c25", 3: "377b67d513818ce9", 4: "b9084ed7cd0575f6", 5: "b9084ed7cd0575f6"}
+SHAPES = {
+    2: "f8449b1cb1bf4c25",
+    3: "377b67d513818ce9",
+    4: "b9084ed7cd0575f6",
+    5: "b9084ed7cd0575f6",
+    6: "b9084ed7cd0575f6",
+}
 """What the messages of each version of the protocol look like; one that was in use keeps its line.
 
-Version 5 differs in how hosts greet.
+Version 5 differs in how hosts greet, version 6 in that, too, and in the age beside each message.
 """
 
 

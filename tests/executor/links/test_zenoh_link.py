@@ -13,8 +13,8 @@ from support.certificates import Site
 from support.link_rigs import PATIENCE_SECONDS, Heard, free_port, running
 
 from firable.executor.drivers.bench import until
-from firable.executor.links.encoding import encode
-from firable.executor.links.link import COORDINATOR, PROTOCOL_VERSION, Greeting, Memory
+from firable.executor.links.encoding import pack
+from firable.executor.links.link import COORDINATOR, PROTOCOL_VERSION, Greeting, Memory, Storage
 from firable.executor.links.zenoh_link import Certificates, ZenohLink, open_to_the_network
 from firable.executor.protocol.messages import Decision, Readiness, Report
 from firable.nets.diagnostics import InputError, Severity
@@ -64,9 +64,9 @@ def test_of_two_hosts_with_one_name_the_first_is_heard_until_it_ends() -> None:
         here, first, second = ZenohLink(CENTRE, listen=[at]), ZenohLink(ROBOT, join=[at]), ZenohLink(ROBOT, join=[at])
         message = Decision("robot", 1, None, 0, 0)
         async with running(here) as centre, AsyncExitStack() as until_it_ends:
-            one = await until_it_ends.enter_async_context(running(first, Memory("r1")))
+            one = await until_it_ends.enter_async_context(running(first, Memory(Storage("r1"))))
             await centre.until_told(("connected", "robot"))
-            async with asyncio.timeout(PATIENCE_SECONDS), running(second, Memory("r1")) as two:
+            async with asyncio.timeout(PATIENCE_SECONDS), running(second, Memory(Storage("r1"))) as two:
                 await centre.until_told(("refused", "robot"))
                 assert [problem.code for problem in centre.problems] == ["F5020"]
                 assert "two hosts" in centre.problems[0].message
@@ -94,10 +94,10 @@ def test_a_second_host_is_known_by_none_of_its_machines() -> None:
     async def main() -> None:
         at = f"tcp/127.0.0.1:{free_port()}"
         more = replace(ROBOT, names=("robot", "mc"))
-        first = running(ZenohLink(ROBOT, join=[at]), Memory("r1"))
+        first = running(ZenohLink(ROBOT, join=[at]), Memory(Storage("r1")))
         async with running(ZenohLink(CENTRE, listen=[at])) as centre, first:
             await centre.until_told(("connected", "robot"))
-            async with running(ZenohLink(more, join=[at]), Memory("r1")) as second:
+            async with running(ZenohLink(more, join=[at]), Memory(Storage("r1"))) as second:
                 await second.until_told(("refused", COORDINATOR))
                 await asyncio.sleep(0.2)
                 assert ("connected", "mc") not in centre.told
@@ -118,7 +118,7 @@ def test_what_a_stranger_publishes_is_not_delivered() -> None:
             await centre.until_told(("connected", "robot"))
             await robot.until_told(("connected", COORDINATOR))
             assert there.session is not None
-            message = encode(Report("robot", Readiness(0, frozenset())))
+            message = pack(0, Report("robot", Readiness(0, frozenset())))
             to = f"firable/{PROTOCOL_VERSION}/d1/to/%/{here.identity}/from/robot"
             there.session.put(f"{to}/{there.identity}", b"\xff" + message)  # damaged
             there.session.put(f"{to}/abc", message)  # of a process that is not known
