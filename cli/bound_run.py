@@ -9,7 +9,7 @@ import click
 from firable.cli import text
 from firable.cli.log import told_aside
 from firable.cli.report import Report
-from firable.cli.watched import machines_verdict
+from firable.cli.watched import machines_verdict, show_coalesced
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -59,7 +59,7 @@ def run_bound_of(
             log=log,
         )
     known = report.to_json()
-    kept = ("state", "message", "marking", "blocked", "firings", "commands", "messages", "divergence")
+    kept = ("state", "message", "marking", "blocked", "firings", "commands", "messages", "coalesced", "divergence")
     return Report(
         "run",
         path,
@@ -84,6 +84,7 @@ def show_bound(report: Report) -> None:
         f"  {text.counted(sum(done['firings'].values()), 'firing')}, {text.counted(done['commands'], 'command')} to "
         f"machines, {text.counted(done['messages'], 'message')} between coordinator and controllers"
     )
+    show_coalesced(done["coalesced"])
     if refuted := [verdict for verdict in report.verdicts if not verdict.holds]:
         text.show_verdicts(report.net, refuted)
     text.show_summary(report)

@@ -15,7 +15,7 @@ from firable.cli import text
 from firable.cli.finite import FiniteRange
 from firable.cli.log import told_aside
 from firable.cli.report import Report
-from firable.cli.watched import machines_verdict
+from firable.cli.watched import machines_verdict, show_coalesced
 from firable.nets.source import printable
 
 if TYPE_CHECKING:
@@ -201,6 +201,7 @@ def show_host(report: Report) -> None:
     names = ", ".join(name or "the coordinator" for name in done["machines"])
     click.echo(f"  {names}: {done['state']}")
     click.echo(f"  {text.counted(done['messages'], 'message')}, {done['repeats']:,} of them repeated")
+    show_coalesced(done["coalesced"])
     text.show_verdicts(report.net, report.verdicts)
     for file in report.files:
         click.echo(f"  trace {file}; `firable replay` judges it together with those of the other hosts")

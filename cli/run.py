@@ -19,7 +19,7 @@ from firable.cli.operate import ServeOptions, serve_options
 from firable.cli.options import CATALOGUE, answer, catalogue_file, format_option, refuse_a_net
 from firable.cli.report import Report
 from firable.cli.sign import trust_option
-from firable.cli.watched import machines_verdict
+from firable.cli.watched import machines_verdict, show_coalesced
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -352,6 +352,7 @@ def _show(report: Report) -> None:
     if several:
         told = ", ".join(f"{count:,} by {name}" for name, count in done["decided"].items())
         click.echo(f"  decided: {told}")
+    show_coalesced(done["coalesced"])
     if done["state"] in {"stopped", "done"} and done["message"]:
         click.echo(f"  {done['message']}")
     refuted = [verdict for verdict in report.verdicts if not verdict.holds]

@@ -1,10 +1,16 @@
-"""What `firable run` says of the machines: whether they did what their model allows."""
+"""What `firable run` says of the machines: whether they did what their model allows, and what came too fast."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import click
+
+from firable.cli import text
+
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from firable.executor import RunReport
     from firable.executor.operating.hosting import HostReport
     from firable.nets.verdict import Verdict
@@ -22,3 +28,9 @@ def machines_verdict(report: RunReport | HostReport, method: str) -> tuple[Verdi
         return (Verdict(name, Status.PROVED, statement, method),)
     hint = f"at {found.at_seconds:.2f} s: {found.message}; mend the plant file, or look at that machine"
     return (Verdict(name, Status.VIOLATED, statement, method, hint=hint, subjects=found.places),)
+
+
+def show_coalesced(changes: Mapping[str, int]) -> None:
+    """The signals that changed faster than they are read, that which did so most at first; nothing where none did."""
+    for signal, count in sorted(changes.items(), key=lambda one: -one[1]):
+        click.echo(f"  {signal} changed faster than it is read: {text.counted(count, 'change')} told to nobody")

@@ -24,7 +24,7 @@ coordinated transition takes a dozen, and nothing gained: acts exclude each othe
 from __future__ import annotations
 
 import asyncio
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Collection
 from typing import Final, assert_never
 
@@ -66,7 +66,8 @@ AHEAD_MAX: Final = 10_000
 class Acts:
     """The machines of these names, as the journal kept them, and what they do.
 
-    `wake` is called when there is something to do; `left` when a controller's part of a transition has fired.
+    `wake` is called when there is something to do; `left` when a controller's part of a transition has fired. In
+    `coalesced` they count the changes of signals that are taken back before a promise lets them be seen.
     """
 
     def __init__(
@@ -78,12 +79,14 @@ class Acts:
         figures: Figures | None,
         wake: Callable[[], None],
         left: Callable[[str, str], None],
+        coalesced: Counter[str],
     ) -> None:
         self.journal = journal
         self.recorder = recorder
         self.figures = figures
         self.wake = wake
         self.left = left
+        self.coalesced = coalesced
         self.coordinators = {
             name: Coordinator.restored(decomposition, journal.kept(name), name)
             for name in coordinators(decomposition)
@@ -238,7 +241,7 @@ class Acts:
         effects: list[Effect] = []
         match item:
             case SignalRead():
-                effects = controller.read(item.signal, item.value, item.entry)
+                effects = self._read(controller, item)
             case VoteRequest() if self._withholds(item):
                 self.withheld[machine, item.round] = item
                 return
@@ -269,6 +272,17 @@ class Acts:
         effects += controller.report()
         if effects:
             self.act(machine, effects)
+
+    def _read(self, controller: LocalController, item: SignalRead) -> list[Effect]:
+        """Give a controller a signal; two changes are coalesced by one that comes back to what a promise has kept."""
+        if not (latched := controller.latched):
+            return controller.read(item.signal, item.value, item.entry)
+        was = latched.get(item.signal)
+        effects = controller.read(item.signal, item.value, item.entry)
+        is_kept = bool(controller.word & controller.player.signal_bit(item.signal)) == item.value
+        if was is not None and latched.get(item.signal, was) != was and is_kept:
+            self.coalesced[item.signal] += 2
+        return effects
 
     def _withholds(self, item: VoteRequest | Decision) -> bool:
         return self.halted and not self.is_leaving and item.coordinator not in self.coordinators

@@ -32,6 +32,7 @@ from firable.executor.operating import ending, latch, lives, restart, stopping
 from firable.executor.operating.acts import Acts
 from firable.executor.operating.aside import UntoldError
 from firable.executor.operating.clock import RunClock
+from firable.executor.operating.coalesced import Coalesced
 from firable.executor.operating.dispatch import Dispatch
 from firable.executor.operating.figures import Figures
 from firable.executor.operating.groups import Groups
@@ -119,6 +120,7 @@ class Host:
         """Whether somebody has asked for the end of the run."""
         self.turn = 0
         self.clock: RunClock | None = None
+        self.coalesced = Coalesced(driver)
         self.begin(resume=resume)
         if figures is not None and self.taking_up is not None:
             figures.taken_up(self.marking)
@@ -137,6 +139,7 @@ class Host:
             self.figures,
             self.groups.wake,
             self.dispatch.left,
+            self.coalesced.behind_promises,
         )
         self.coordinators, self.controllers = self.acts.coordinators, self.acts.controllers
         at_once, go_on = self.groups.at_once, self._go_on

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ssl
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
@@ -71,6 +71,8 @@ class HostReport:
     never_met: tuple[str, ...]
     watched: bool = False
     divergence: Divergence | None = None
+    coalesced: Mapping[str, int] = field(default_factory=dict)
+    """For each signal how many of its changes came faster than they were read, and were told to nobody."""
 
     def to_json(self) -> dict[str, object]:
         """The report as JSON data."""
@@ -83,6 +85,7 @@ class HostReport:
             "messages": self.messages,
             "repeats": self.repeats,
             "never_met": list(self.never_met),
+            "coalesced": dict(self.coalesced),
             **({"divergence": self.divergence.to_json()} if self.divergence is not None else {}),
         }
 
@@ -219,6 +222,13 @@ def run_host(
         if files.is_taken_up:
             host.unwatch()
         situation = run_to_the_end(host, service, figures)
-    acts = host.acts
-    never_met = host.peers.never_met
-    return HostReport(situation, machines, acts.messages, acts.repeats, never_met, host.is_watched, host.divergence)
+    return HostReport(
+        situation,
+        machines,
+        host.acts.messages,
+        host.acts.repeats,
+        host.peers.never_met,
+        host.is_watched,
+        host.divergence,
+        host.coalesced.up_to_now(host.driver),
+    )

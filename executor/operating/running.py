@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
@@ -69,6 +69,8 @@ class RunReport:
     """Whether the machines were held against their plant file, from the beginning to the end or to a divergence."""
     divergence: Divergence | None = None
     """The first thing that they did and could not have done, or did not and must have."""
+    coalesced: Mapping[str, int] = field(default_factory=dict)
+    """For each signal how many of its changes came faster than they were read, and were told to nobody."""
 
     @property
     def state(self) -> State:
@@ -90,6 +92,7 @@ class RunReport:
             "commands": self.commands,
             "messages": self.messages,
             "decided": dict(self.decided),
+            "coalesced": dict(self.coalesced),
             "simulated_seconds": self.simulated_seconds,
             **({} if self.divergence is None else {"divergence": self.divergence.to_json()}),
         }
@@ -233,6 +236,7 @@ def execute(
         simulated_seconds=host.now_seconds(),
         watched=host.is_watched,
         divergence=host.divergence,
+        coalesced=host.coalesced.up_to_now(host.driver),
     )
 
 
@@ -301,6 +305,7 @@ def run_bound(
         host.now_seconds(),
         watched=host.is_watched,
         divergence=host.divergence,
+        coalesced=host.coalesced.up_to_now(host.driver),
     )
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import gc
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -117,31 +118,22 @@ async def terminable(host: Host) -> Situation:
 
 
 class Inputs:
-    """The figures of what the driver of a host reads, brought up to date when somebody asks for them.
-
-    A driver counts what it has coalesced from its own beginning, and a host gets another one after an emergency stop.
-    """
+    """The figures of what the driver of a host reads, brought up to date when somebody asks for them."""
 
     def __init__(self, host: Host, figures: Metrics) -> None:
         self.host = host
         self.figures = figures
-        self.driver = host.driver
-        self.counted: dict[str, int] = {}
-        """What of its driver the figures have."""
+        self.counted: Counter[str] = Counter()
+        """What the figures have of the changes that were coalesced."""
 
     def look(self) -> None:
-        """Take what the driver has read since the last look, with the rest of one that is gone."""
-        self._count()
-        if self.host.driver is not self.driver:
-            self.driver, self.counted = self.host.driver, {}
-            self._count()
-
-    def _count(self) -> None:
-        for signal, reading in self.driver.readings().items():
+        """Take what was read since the last look."""
+        for signal, reading in self.host.driver.readings().items():
             self.figures.input_read(signal, good=reading.quality is Quality.GOOD)
-            if new := reading.coalesced - self.counted.get(signal, 0):
-                self.figures.inputs_coalesced(signal, new)
-                self.counted[signal] = reading.coalesced
+        now = self.host.coalesced.up_to_now(self.host.driver)
+        for signal, new in (now - self.counted).items():
+            self.figures.inputs_coalesced(signal, new)
+        self.counted = now
 
 
 async def _serving(host: Host, service: Service, figures: Metrics) -> Situation:

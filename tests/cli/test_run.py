@@ -5,17 +5,23 @@ import re
 import signal
 import subprocess
 import sys
+from importlib.resources import files
 from pathlib import Path
 
+import jsonschema
 import pytest
 from support.cells import decomposition_of, plant_of
 from support.waiting import PATIENCE_SECONDS, heard_in_time, until
 
+from firable.cli.bound_run import run_bound_of
 from firable.cli.main import main
 from firable.cli.run import _verdicts
 from firable.executor import execute
 from firable.executor.cell.disturbances import NeverCompletes
+from firable.executor.drivers import binding
+from firable.executor.operating import running
 from firable.executor.operating.running import Watch
+from firable.nets.bundle import read_bundle
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.semantics.joining import VOTED
 from firable.semantics.replaying import replay
@@ -322,3 +328,40 @@ def test_a_run_that_is_stopped_at_a_divergence_tells_it_once() -> None:
     through, _, machines = _verdicts(report, 3, 0)
     assert through.hint == "the machines are not as they are modelled; see machines-as-modelled"
     assert report.divergence.message in machines.hint
+
+
+def test_the_report_of_machines_that_are_not_as_they_are_modelled_is_as_its_schema_says(
+    bundle: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ended = execute(
+        decomposition_of("one_robot"),
+        plant_of("one_robot"),
+        workpieces=3,
+        disturbances=[NeverCompletes("R", "MOVE", 3)],
+        watch=Watch.STOP,
+    )
+    monkeypatch.setattr(running, "run_bound", lambda *_, **__: ended)
+    monkeypatch.setattr(binding, "read_binding", lambda _: None)
+    report = run_bound_of(
+        bundle,
+        read_bundle(bundle),
+        "b",
+        None,
+        None,
+        None,
+        {},
+        resume=False,
+        plant=None,
+        watch=Watch.STOP,
+        service=None,
+        log=None,
+    ).to_json()
+    schema = json.loads(files("firable.cli").joinpath("report.schema.json").read_text(encoding="utf-8"))
+    bound = {
+        **schema,
+        "properties": {"run": {"$ref": "#/$defs/bound_run"}},
+        "additionalProperties": True,
+        "required": [],
+    }
+    jsonschema.Draft202012Validator(bound).validate(report)
+    assert report["run"]["divergence"]["places"]

@@ -1,6 +1,7 @@
 """Hosts of a cell of which parts are free of promise: traces join, and who is halted obeys no order on votes."""
 
 import asyncio
+from collections import Counter
 from pathlib import Path
 from unittest.mock import ANY, Mock
 
@@ -93,6 +94,7 @@ class OneHost:
             None,
             lambda: None,
             lambda controller, transition: self.left.append((controller, transition)),
+            Counter(),
         )
         self.acts.start()
 
