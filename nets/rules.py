@@ -74,7 +74,7 @@ _SAID_OF_ALL: Final[Mapping[str, str]] = {
     "F3019": "where the order of the two matters, make one wait for the other by a place",
     "F3022": "mend the net or the property; till then `{name}: violated` under `expect` passes `check`, not `bundle`",
     "F3023": "mend the net or the query; a formula that has to hold belongs under `properties` of the file",
-    "F5007": "`firable view NET --trace FILE` plays the trace of `run --trace`, and tells what each transition waits for",
+    "F5007": "`firable view NET --trace FILE` plays what `--trace` wrote, and tells what each transition waits for",
 }
 
 
