@@ -30,6 +30,7 @@ import ipaddress
 import os
 import secrets
 import ssl
+import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Iterable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -38,7 +39,7 @@ from typing import Final, Protocol
 from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
-from firable.executor.operating.own_certificate import fault_of, unloaded
+from firable.executor.operating.own_certificate import fault_of, fault_of_authority, unloaded
 from firable.executor.operating.situation import Situation, State
 from firable.executor.protocol.commands import Answer
 from firable.nets.diagnostics import Diagnostic, InputError
@@ -274,18 +275,21 @@ def tls_context(certificate: str, key: str, client_authority: str | None) -> ssl
     """The server's side of TLS; with an authority, of clients that it has signed only. Raises `InputError` F5062."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
+    whose, hint = "the certificate of the operator's endpoint", "renew it, or set the clock of this host"
     try:
         context.load_cert_chain(certificate, key)
-        if client_authority is not None:
+        fault = fault_of(certificate, key, is_server=True)
+        if fault is None and client_authority is not None:
             context.load_verify_locations(client_authority)
             context.verify_mode = ssl.CERT_REQUIRED
-        fault = fault_of(certificate, key, is_server=True)
-        hint = "renew it, or set the clock of this host"
+            if fault := fault_of_authority(client_authority, time.time()):
+                whose = f"the authority of the operators in {printable(client_authority)}"
+                hint = "name the certificate that has signed those of the operators, and look at the clock of this host"
     except (OSError, ValueError) as error:
         fault = unloaded(error, certificate, key, *([] if client_authority is None else [client_authority]))
         hint = "name PEM files of a certificate and its key"
     if fault is not None:
-        message = f"the certificate of the operator's endpoint cannot be used: {fault}"
+        message = f"{whose} cannot be used: {fault}"
         raise InputError([Diagnostic("F5062", message, hint)])
     return context
 

@@ -8,6 +8,7 @@ signed it; at connection the hosts compare what they hold.
 from __future__ import annotations
 
 import ssl
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,7 +20,7 @@ from firable.executor.operating.host import Host, Told
 from firable.executor.operating.local_monitor import LocalMonitor
 from firable.executor.operating.log import Log
 from firable.executor.operating.monitor import Divergence
-from firable.executor.operating.own_certificate import fault_of
+from firable.executor.operating.own_certificate import fault_of, fault_of_authority
 from firable.executor.operating.running import Watch
 from firable.executor.operating.service import Service, figures_for, patience_with, run_to_the_end
 from firable.executor.operating.situation import Situation
@@ -153,6 +154,10 @@ def _demand_certificates(authority: str, certificate: str, key: str, *, serves: 
     except (OSError, ValueError) as error:  # ssl.SSLError is an OSError
         message = f"{printable(problem)}: {printable(str(getattr(error, 'reason', None) or error))}"
         raise InputError([Diagnostic("F5062", message, "name PEM files, and a key without a password")]) from None
+    if fault := fault_of_authority(authority, time.time()):
+        message = f"the authority in {printable(authority)} cannot be used: {fault}"
+        hint = "name the certificate by which those of the hosts were signed, and look at the clock of this host"
+        raise InputError([Diagnostic("F5062", message, hint)])
     for is_server in (True,) * serves + (False,) * joins:
         if fault := fault_of(certificate, key, is_server=is_server):
             message = f"the certificate {printable(certificate)} cannot be used: {printable(fault)}"

@@ -1,4 +1,4 @@
-"""Whether a certificate of one's own is still good, asked before it is shown to anybody.
+"""Whether a certificate of one's own, or of those whom one believes, is still good, asked before anybody comes.
 
 Who is shown a certificate that has expired closes the connection and says no more; the alert of TLS is lost on the way.
 So the one who has it looks first. Python's `ssl` reads no dates but in a handshake: here is one with oneself, in
@@ -29,6 +29,25 @@ def unloaded(error: OSError | ValueError, *files: str) -> str:
     if isinstance(error, ssl.SSLError):
         return "the key is that of another certificate" if error.reason == "KEY_VALUES_MISMATCH" else "it is not in PEM"
     return (error.strerror if isinstance(error, OSError) else None) or str(error)
+
+
+def fault_of_authority(file: str, now_seconds: float) -> str | None:
+    """Why no certificate is believed by the authorities in a file, at a time of the clock, or None.
+
+    OpenSSL takes any certificate there for an authority, and says nothing before somebody is turned away by it. Raises
+    `OSError` where the file cannot be read, or is none of certificates.
+    """
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.load_verify_locations(file)
+    known = context.get_ca_certs()
+    if not known:
+        return "it holds no certificate of an authority (one that may sign others)"
+    dates = [[ssl.cert_time_to_seconds(str(one[key])) for key in ("notBefore", "notAfter")] for one in known]
+    if all(end < now_seconds for _, end in dates):
+        return "certificate has expired"
+    if all(now_seconds < begin or end < now_seconds for begin, end in dates):
+        return "certificate is not yet valid"
+    return None
 
 
 def fault_of(certificate: str, key: str, *, is_server: bool) -> str | None:

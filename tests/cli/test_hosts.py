@@ -147,6 +147,17 @@ def test_a_certificate_that_has_expired_is_refused_before_it_is_shown(
     )
 
 
+def test_hosts_whose_authority_has_expired_are_refused_before_they_are_linked(
+    bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = Site(tmp_path / "site", valid_days=(-2, -1)).host("robot")
+    tls = ["--tls", own.authority, own.certificate, own.key]
+    assert main(["run", bundle, "--controller", "robot", "--dry-run", "1", "--join", "tls/127.0.0.1:1", *tls]) == 2
+    assert f"error[F5062]: the authority in {own.authority} cannot be used: certificate has expired" in (
+        capsys.readouterr().err
+    )
+
+
 def test_a_host_that_is_started_again_without_its_journal_or_with_an_older_copy_is_refused_with_one_clear_error(
     bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -17,6 +17,7 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
+from support.certificates import Site
 
 from firable.cli.run import run
 from firable.executor.drivers.bench import PATIENCE_S, until
@@ -287,6 +288,32 @@ def test_files_that_are_no_certificate_are_one_clear_error(tmp_path: Path) -> No
     with pytest.raises(InputError) as caught:
         tls_context(str(broken), str(broken), None)
     assert caught.value.diagnostics[0].code == "F5062"
+
+
+@pytest.mark.parametrize(
+    ("valid_days", "why"),
+    [
+        ((-2, -1), "certificate has expired"),
+        ((1, 2), "certificate is not yet valid"),
+        (None, "no certificate of an"),
+    ],
+)
+def test_an_authority_by_which_nobody_is_believed_is_refused_before_anybody_comes(
+    valid_days: tuple[float, float] | None, why: str, tmp_path: Path
+) -> None:
+    good, other = Site(tmp_path / "good"), Site(tmp_path / "other", valid_days=valid_days or (-1, 1))
+    own, authority = good.host("run"), str(other.authority)
+    if valid_days is None:
+        authority = good.host("anna").certificate
+    tls_context(own.certificate, own.key, own.authority)
+    with pytest.raises(InputError, match=why) as caught:
+        tls_context(own.certificate, own.key, authority)
+    (problem,) = caught.value.diagnostics
+    assert problem.code == "F5062"
+    assert authority in problem.message
+    both = tmp_path / "both.pem"  # one that is good is enough
+    both.write_text(Path(authority).read_text() + Path(own.authority).read_text())
+    tls_context(own.certificate, own.key, str(both))
 
 
 def test_an_answer_that_takes_for_ever_does_not_keep_the_process_when_the_run_is_over() -> None:

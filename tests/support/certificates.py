@@ -17,13 +17,13 @@ Signer = tuple[x509.Name, ec.EllipticCurvePrivateKey]
 class Site:
     """An authority, and its files in a folder."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, valid_days: tuple[float, float] = (-0.1, 1.0)) -> None:
         self.folder = folder
         folder.mkdir()
         self.key = ec.generate_private_key(ec.SECP256R1())
         self.name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, folder.name)])
         self.authority = folder / "authority.pem"
-        signed = self._certificate(self.name, self.key, is_authority=True)
+        signed = self._certificate(self.name, self.key, is_authority=True, valid_days=valid_days)
         self.authority.write_bytes(signed.public_bytes(serialization.Encoding.PEM))
 
     def host(self, name: str, *, valid_days: tuple[float, float] = (-0.1, 1.0), address: str = HERE) -> Certificates:
