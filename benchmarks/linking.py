@@ -39,7 +39,7 @@ import zenoh
 from measuring import Table, against
 
 from firable.executor.drivers.dry_run import DryRunDriver
-from firable.executor.links.encoding import decode, encode
+from firable.executor.links.encoding import pack, unpack
 from firable.executor.links.lending import LendingLoop
 from firable.executor.links.link import COORDINATOR, Greeting
 from firable.executor.links.zenoh_link import ZenohLink
@@ -115,7 +115,7 @@ def bare(at: str, repeat: int, *, reads: bool = False) -> list[float]:
 
     def answer(sample: zenoh.Sample) -> None:
         if reads:
-            decode(sample.payload.to_bytes())
+            unpack(sample.payload.to_bytes())
         answered.add(str(sample.key_expr))
         if len(answered) == len(CONTROLLERS):
             all_answered.set()
@@ -130,7 +130,7 @@ def bare(at: str, repeat: int, *, reads: bool = False) -> list[float]:
         all_answered.clear()
         for name, publisher in zip(CONTROLLERS, publishers, strict=True):
             number = len(took)
-            publisher.put(encode(Decision(name, number, "go", number, number)) if reads else PAYLOAD)
+            publisher.put(pack(number, Decision(name, number, "go", number, number)) if reads else PAYLOAD)
         if all_answered.wait(0.5):  # not all are there yet
             took.append(time.perf_counter() - begin)
     del subscriber
@@ -153,9 +153,9 @@ def read_and_answer(name: str, at: str) -> None:
     ready = frozenset(("back",))
 
     def answer(sample: zenoh.Sample) -> None:
-        order = decode(sample.payload.to_bytes())
+        age, order = unpack(sample.payload.to_bytes())
         assert isinstance(order, Decision)
-        back.put(encode(Acknowledgement(name, order.round, Readiness(order.seen + 1, ready))))
+        back.put(pack(age, Acknowledgement(name, order.round, Readiness(order.seen + 1, ready))))
 
     _subscriber = opened.declare_subscriber(f"yardstick/to/{name}", answer)
     Event().wait()
