@@ -111,7 +111,7 @@ def _write(journals: Mapping[str, Sequence[str]], digest: str, moved: Takeover) 
     from firable.executor.journal.journal import sync_now
     from firable.executor.journal.memory import HOSTS, keeping, new_name
     from firable.executor.journal.sqlite_journal import SqliteJournal, witness_of
-    from firable.executor.links.link import Memory, Storage
+    from firable.executor.links.storages import Memory, Met, Storage
     from firable.executor.protocol.messages import Keep
     from firable.nets.writing import write_whole
 
@@ -121,7 +121,9 @@ def _write(journals: Mapping[str, Sequence[str]], digest: str, moved: Takeover) 
         whole: dict[str, bytes] = {}
         for number, (file, names) in enumerate(journals.items()):
             written = Path(aside, str(number))
-            others = Memory(storages[file], {name: storage for name, storage in of.items() if name not in names})
+            others = Memory(
+                storages[file], {name: Met(storage.name) for name, storage in of.items() if name not in names}
+            )
             with closing(SqliteJournal(written, digest, names)) as journal:
                 for name in names:  # of a coordinator that decides nothing there is nothing to keep
                     journal.write(name, [Keep(key, value) for key, value in moved.kept.get(name, {}).items()])

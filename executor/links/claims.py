@@ -2,7 +2,7 @@
 
 A host claims its machines, all at once, for as long as it is there. Every other one answers it: *heard*; the *second*
 that claims one of them, and not heard before the first is gone; or not the one that was met, because its storage is
-another one (*estranged*) or an older copy (*outdated*; `link.Memory`). Two hosts are connected when each hears the
+another one (*estranged*) or an older copy (*outdated*; `storages.py`). Two hosts are connected when each hears the
 other: what one of them refuses the other has to know before it moves anything, and so does the person who has started
 it. Whoever is heard stays heard while it is there.
 
@@ -18,15 +18,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final
 
-from firable.executor.links.link import (
-    Estranged,
-    LinkListener,
-    Storage,
-    come_back_without,
-    run_by_two,
-)
+from firable.executor.links.link import LinkListener, come_back_without, run_by_two
+from firable.executor.links.storages import Estranged, Storage
 
 
 class Answer(StrEnum):
@@ -56,19 +50,6 @@ class Said:
         return Estranged(self.machines, is_older=self.answer is Answer.OUTDATED)
 
 
-_JOINED: Final = "-"
-
-
-def session_of(process: str, storage: Storage) -> str:
-    """The name of a process of a host with this storage: what it claims machines by."""
-    return f"{process}{_JOINED}{storage}"
-
-
-def storage_of(session: str) -> Storage:
-    """The storage of the host that a session is of, as it was when that began."""
-    return Storage.read(session.partition(_JOINED)[2])
-
-
 class Claims:
     """Whom a host hears, and who hears it; `say` has a session told the answer to it, or that taken back by None."""
 
@@ -77,6 +58,8 @@ class Claims:
         self.say = say
         self.machines: dict[str, tuple[str, ...]] = {}
         """What each session claims, in the order in which they came."""
+        self.storages: dict[str, Storage] = {}
+        """What each says of the storage of its host."""
         self.given: dict[str, Said] = {}
         """What each session is answered."""
         self.taken: dict[str, Said] = {}
@@ -86,9 +69,9 @@ class Claims:
         self.told: dict[str, Said] = {}
         """What sessions answer that refuse this host, as it was told."""
 
-    def claimed(self, session: str, machines: Sequence[str]) -> None:
-        """A session claims its machines."""
-        self.machines[session] = tuple(machines)
+    def claimed(self, session: str, machines: Sequence[str], storage: Storage) -> None:
+        """A session of a host with this storage claims its machines."""
+        self.machines[session], self.storages[session] = tuple(machines), storage
         self._settle()
 
     def given_up(self, session: str) -> None:
@@ -96,7 +79,7 @@ class Claims:
         if session not in self.machines:
             return
         self._connect(session, is_connected=False)
-        del self.machines[session], self.given[session]
+        del self.machines[session], self.storages[session], self.given[session]
         self.told.pop(session, None)
         self.say(session, None)
         self._settle()
@@ -125,7 +108,7 @@ class Claims:
         heard = {name for other, said in self.given.items() if said.is_heard for name in self.machines[other]}
         if second := [name for name in machines if name in heard]:
             return Said(Answer.SECOND, tuple(second))
-        if why := self.listener.memory.estranged(machines, storage_of(session)):
+        if why := self.listener.memory.estranged(machines, self.storages[session]):
             return Said(Answer.OUTDATED if why.is_older else Answer.ESTRANGED, why.machines)
         return Said(Answer.HEARD, machines)
 
@@ -144,16 +127,18 @@ class Claims:
         for name in self.machines[session]:
             if is_connected and name not in self.reached:
                 self.reached[name] = session
-                self.listener.connected(name, storage_of(session))
+                self.listener.connected(name, self.storages[session])
             elif not is_connected and self.reached.get(name) == session:
                 del self.reached[name]
                 self.listener.lost(name)
 
     def _tell_against(self, session: str, taken: Said | None) -> None:
-        """Tell that a session refuses this host, once, unless it is refused itself."""
+        """Tell that a session refuses this host, once, unless it is refused itself: of an older copy it is right."""
         if taken is None or taken.is_heard:
             self.told.pop(session, None)
-        elif self.given[session].is_heard and self.told.get(session) != taken:
+            return
+        is_right = self.given[session].is_heard or taken.answer is Answer.OUTDATED
+        if is_right and self.told.get(session) != taken:
             self.told[session] = taken
             for name in self.machines[session]:
                 if taken.answer is Answer.SECOND:

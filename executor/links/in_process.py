@@ -92,14 +92,14 @@ class InProcessLink:
         problem = objection(self.greeting, other.greeting)
         come_back = ours.estranged(other.greeting.names, theirs.storage)
         forgotten = theirs.estranged(self.greeting.names, ours.storage)
+        if problem is None and come_back is not None:
+            problem = come_back_without(come_back)
         for name in other.greeting.names:
             if problem is not None:
                 here.refused(name, problem)
-            elif come_back:
-                here.refused(name, come_back_without(come_back))
-            elif forgotten:
+            if forgotten is not None and (problem is None or forgotten.is_older):
                 here.disowned(name, forgotten)
-            else:
+            elif problem is None:
                 self.peers[name] = other
                 here.connected(name, theirs.storage)
 

@@ -9,21 +9,8 @@ At each connection both sides say who they are (`Greeting`): the version of the 
 the names of the machines. Whoever holds another bundle is refused, with a diagnostic that says so, and nothing of it
 is delivered: two controllers of different nets could promise each other parts that do not exist.
 
-They also say what stable storage they have (`Storage`), which a host remembers of each machine that it has met. One
-that comes back with another storage, a journal mistyped or left out, does not know where its tokens stand: it would
-begin at the places of the start, beside machines and controllers that are somewhere else. One that comes back with an
-*older copy* of its storage, from a backup, would go on from where its tokens stood then. Either is refused (F5025), and
+They also say what stable storage they have (`storages.py`): one that comes back without its own is refused (F5025), and
 is told so.
-
-A copy is known by its *age*. A storage counts how often it was made durable, each message bears that count, and nothing
-leaves a host before what it rests on is durable. So the count of a storage that has all that anybody has heard of is
-not below the last one heard. What nobody has heard of, a transition that a controller fired alone behind its last
-message, is missed by nobody: of that only the machines know, and they are asked. The count is no history: of two copies
-that were both worked with, one after the other and the first unheard, it tells only which has more in it.
-
-Rejected: an age that only the greeting bears. A copy may have been made since, in the very life that has lost the
-original. Rejected, too: the last round that was acknowledged in place of a count. It would be the protocol's, and would
-know nothing of what a controller does alone between two rounds.
 
 Rejected: a link with acknowledged delivery. Its queue would hold old votes back behind a dead line and deliver them
 late, which the protocol must withstand anyway; and an end-to-end acknowledgement is needed all the same (O5).
@@ -31,11 +18,11 @@ late, which the protocol must withstand anyway; and an end-to-end acknowledgemen
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Final, Protocol, Self
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final, Protocol
 
+from firable.executor.links.storages import Estranged, Memory, Storage
 from firable.executor.protocol.messages import Message
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.source import printable
@@ -54,65 +41,6 @@ class Greeting:
     digest: str
     names: tuple[str, ...]
     version: int = PROTOCOL_VERSION
-
-
-_JOINED: Final = "-"
-_COUNT: Final = re.compile("[0-9]{1,19}", re.ASCII)
-
-
-@dataclass(frozen=True, slots=True)
-class Storage:
-    """What the stable storage of a host is known by; where text is needed it is spelled NAME-LIFE-AGE.
-
-    That of a host without a journal is gone with its process.
-
-    >>> str(Storage("5eed", "1a", 7)), Storage.read("5eed-1a-7").age, Storage.read("5eed")
-    ('5eed-1a-7', 7, Storage(name='5eed', life='', age=0))
-    """
-
-    name: str = ""
-    """Given at random when it was made."""
-    life: str = ""
-    """Given at random in each life of the host. Within one life nobody can have put a copy in its place."""
-    age: int = 0
-    """How often it was made durable before that life, or when it was last heard of."""
-
-    def __str__(self) -> str:
-        return _JOINED.join((self.name, self.life, str(self.age)))
-
-    @classmethod
-    def read(cls, text: str) -> Self:
-        """The storage of a text of ours; of any other text one that knows of nothing."""
-        name, _, rest = text.partition(_JOINED)
-        life, _, age = rest.partition(_JOINED)
-        return cls(name, life, int(age) if _COUNT.fullmatch(age) else 0)
-
-
-@dataclass(frozen=True, slots=True)
-class Estranged:
-    """Machines of a host that another one has met with another storage, or has heard later things of."""
-
-    machines: tuple[str, ...]
-    is_older: bool
-    """Whether it is the same storage as it was before that: a copy."""
-
-
-@dataclass(frozen=True, slots=True)
-class Memory:
-    """What hosts know each other by: this host's stable storage, and those of the machines it has met."""
-
-    storage: Storage = Storage()
-    known: Mapping[str, Storage] = field(default_factory=dict)
-    """For each machine that was met, the storage of its host."""
-
-    def estranged(self, machines: Iterable[str], storage: Storage) -> Estranged | None:
-        """Why the host of these machines, with this storage, is not the one that was met; None where it may be."""
-        met = {machine: self.known[machine] for machine in machines if machine in self.known}
-        if others := tuple(machine for machine, known in met.items() if known.name != storage.name):
-            return Estranged(others, is_older=False)
-        if later := tuple(m for m, known in met.items() if known.life != storage.life and known.age > storage.age):
-            return Estranged(later, is_older=True)
-        return None
 
 
 Arrival = tuple[str, str, Message, int]

@@ -24,22 +24,15 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Final, Self
+from typing import Final
 
 import serial
 from pydantic import TypeAdapter, ValidationError
 
 from firable.executor.links.encoding import EncodingError, pack, unpack
 from firable.executor.links.framing import PAYLOAD_BYTES_MAX, Frame, FrameReader, Kind, pack_frame
-from firable.executor.links.link import (
-    Greeting,
-    LinkListener,
-    Memory,
-    Storage,
-    cannot_open,
-    come_back_without,
-    objection,
-)
+from firable.executor.links.link import Greeting, LinkListener, cannot_open, come_back_without, objection
+from firable.executor.links.storages import Memory, Met, Storage
 from firable.executor.protocol.messages import Message
 from firable.nets.interchange import canonical_json
 
@@ -63,17 +56,12 @@ class _Said:
     instance: str
     storage: str = ""
     known: Mapping[str, str] = field(default_factory=dict)
-    """Hosts of older versions say neither, and are refused by their version."""
-
-    @classmethod
-    def of(cls, greeting: Greeting, instance: str, memory: Memory) -> Self:
-        """What a host with this memory says."""
-        return cls(greeting, instance, str(memory.storage), {name: str(of) for name, of in memory.known.items()})
+    """What is remembered of the machines of the other host. Hosts of older versions say neither."""
 
     @property
     def memory(self) -> Memory:
         """What a host remembers that says this."""
-        return Memory(Storage.read(self.storage), {name: Storage.read(of) for name, of in self.known.items()})
+        return Memory(Storage.read(self.storage), {name: Met.read(met) for name, met in self.known.items()})
 
 
 _SAID: Final = TypeAdapter(_Said)
@@ -112,6 +100,7 @@ class SerialLink:
         self.greeting = greeting
         self.port = port
         self.own = own
+        self.addresses = addresses
         self.baud = baud
         self.lease_seconds = lease_seconds
         self.answer_seconds = answer_seconds
@@ -243,7 +232,9 @@ class SerialLink:
     def _frame(self, to: int, peer: _Peer, number: int, *, greet: bool = False) -> bytes:
         """A frame for a host: the greeting as long as it is not connected, then as many messages as go into one."""
         if greet or not peer.names:
-            said = _Said.of(self.greeting, self.instance, self._tell().memory)
+            memory = self._tell().memory
+            known = {name: str(met) for name, met in memory.known.items() if self.addresses.get(name) == to}
+            said = _Said(self.greeting, self.instance, str(memory.storage), known)
             payload = canonical_json(_SAID.dump_python(said, mode="json"))
             return pack_frame(Frame(to, self.own, Kind.GREETING, number, payload))
         lines: list[bytes] = []
@@ -285,7 +276,7 @@ class SerialLink:
                 for name in said.greeting.names:
                     if problem is not None:
                         here.refused(name, problem)
-                    elif forgotten is not None:
+                    if forgotten is not None and (problem is None or forgotten.is_older):
                         here.disowned(name, forgotten)
         elif not peer.names:
             peer.names, peer.instance = said.greeting.names, said.instance

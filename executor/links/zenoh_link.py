@@ -3,15 +3,16 @@
 A greeting is a *liveliness token*, which Zenoh shows to every peer and takes back when the session ends, its TCP
 connection breaks or its lease is over. Its key says all that the greeting has to:
 
-    firable/VERSION/DIGEST/alive/NAMES/SESSION                     a host is there, with these machines
+    firable/VERSION/DIGEST/alive/NAMES/SESSION-STORAGE             a host is there, with these machines
     firable/VERSION/DIGEST/heard/SESSION/by/SESSION/ANSWER/NAMES   it is heard by that one, or is not, and why
     firable/VERSION/DIGEST/to/NAME/SESSION/from/NAME/SESSION       a message, with the age of the sender's storage
 
 Keys of messages bear version, digest and both sessions, so that nothing of another bundle, or meant for the process
-that ran the machine before, is even routed. A SESSION is Zenoh's identity of it and the storage of its host
-(`Storage`). Two hosts are connected when each has answered the other that it hears it (`claims.py`): what one refuses,
-the other must know, before anything moves there. Of two hosts that claim one machine the first is heard and the other
-refused; where the first is dead and nobody has noticed yet, the second takes its place when the lease is over.
+that ran the machine before, is even routed. A SESSION is Zenoh's identity of it; STORAGE is the storage of its host
+(`storages.py`). Two hosts are connected when each has answered the other that it hears it (`claims.py`): what one
+refuses, the other must know, before anything moves there. Of two hosts that claim one machine the first is heard and
+the other refused; where the first is dead and nobody has noticed yet, the second takes its place when the lease is
+over.
 
 The *lease* is set, and not left at Zenoh's ten seconds: a frozen host is noticed after it. A killed one is noticed at
 once. While the line is down nothing is kept: what is sent then is lost, and the link is up again by itself.
@@ -42,10 +43,11 @@ from urllib.parse import quote, unquote
 
 import zenoh
 
-from firable.executor.links.claims import Answer, Claims, Said, session_of
+from firable.executor.links.claims import Answer, Claims, Said
 from firable.executor.links.encoding import EncodingError, pack, unpack
 from firable.executor.links.lending import LendingLoop
 from firable.executor.links.link import COORDINATOR, Arrival, Greeting, LinkListener, cannot_open, objection
+from firable.executor.links.storages import Storage
 from firable.executor.protocol.messages import Message
 from firable.nets.diagnostics import Diagnostic, Severity
 from firable.nets.source import printable
@@ -55,6 +57,7 @@ LEASE_SECONDS: Final = 1.0
 
 _OPENING_SECONDS: Final = 2.0
 _NAMELESS: Final = "%"  # which no name is quoted to
+_WITH: Final = "-"  # which is in no identity
 _AND: Final = ","  # which is in no quoted name
 _REST: Final = "**"
 
@@ -109,7 +112,7 @@ class ZenohLink:
         except zenoh.ZError as error:
             raise cannot_open(", ".join((*self.listen, *self.join)), str(error).partition(" at /")[0]) from None
         self.session, self.listener = session, listener
-        self.identity = session_of(str(session.info.zid()), listener.memory.storage)
+        self.identity = str(session.info.zid())
         self.claims = Claims(listener, self._answer)
         self.lending = loop if isinstance(loop, LendingLoop) else None
         try:
@@ -118,7 +121,8 @@ class ZenohLink:
             for name in self.greeting.names:
                 at = f"{ours}/to/{_spelled(name)}/{self.identity}/{_REST}"
                 kept.append(session.declare_subscriber(at, lambda s: self._on(loop, s, is_message=True)))
-            kept.append(tokens.declare_token(f"{ours}/alive/{_all_spelled(self.greeting.names)}/{self.identity}"))
+            claim = f"{_all_spelled(self.greeting.names)}/{self.identity}{_WITH}{listener.memory.storage}"
+            kept.append(tokens.declare_token(f"{ours}/alive/{claim}"))
             for heard in (f"{ours}/heard/{self.identity}/by/*/*/*", "firable/*/*/alive/*/*"):
                 take = partial(self._on, loop, is_message=False)
                 kept.append(tokens.declare_subscriber(heard, take, history=True))
@@ -248,8 +252,11 @@ class ZenohLink:
             _, _, by, answer, machines = rest
             with suppress(ValueError):  # no answer that there is
                 claims.answered(by, Said(Answer(answer), _all_read(machines)), taken_back=gone)
-        elif rest[1] != self.identity:
-            machines, session = rest
+        else:
+            machines, claim = rest
+            session, _, storage = claim.partition(_WITH)
+            if session == self.identity:
+                return
             greeting = Greeting(_read(digest), _all_read(machines), int(version) if version.isdecimal() else -1)
             if (problem := objection(self.greeting, greeting)) is not None:
                 for name in greeting.names if not gone else ():
@@ -257,7 +264,7 @@ class ZenohLink:
             elif gone:
                 claims.given_up(session)
             else:
-                claims.claimed(session, greeting.names)
+                claims.claimed(session, greeting.names, Storage.read(storage))
         self.publishers = {to: kept for to, kept in self.publishers.items() if claims.reached.get(to[1]) == to[2]}
 
     def _answer(self, session: str, said: Said | None) -> None:

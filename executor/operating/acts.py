@@ -104,6 +104,10 @@ class Acts:
         self.stored_in = ""
         """What is being written, in words."""
         self.unsynced = False
+        self.then: list[Callable[[], None]] = []
+        """What is called when all that was written until now is stored."""
+        self.then_stored: list[Callable[[], None]] = []
+        """What is called when the sync that is under way is over."""
         self.in_group = False
         """Whether a group is being done: then nobody has to be woken for what is posted."""
         self.has_news = False
@@ -316,9 +320,10 @@ class Acts:
             delay = self.clock.loop_delay_seconds(due)
             self.ticks[machine] = self.clock.loop.call_later(delay, self.hear, machine, None)
 
-    def remember(self, whose: str, keeps: Collection[Keep]) -> None:
-        """Have the journal keep something that is no machine's, with the next sync."""
-        self.journal.write(whose, keeps)
+    def have_kept(self, then: Callable[[], None] | None = None) -> None:
+        """Have the journal keep what was written to it beside the acts, and call this as soon as that is stored."""
+        if then is not None:
+            self.then.append(then)
         self.unsynced = True
         self.wake()
 
@@ -418,6 +423,7 @@ class Acts:
         sync = None
         if self.unsynced:
             self.unsynced = False
+            self.then_stored, self.then = self.then, []
             self.journal.write(TRACE, self.recorder.keep())
             sync = self.journal.sync()
         writing = self.recorder.writing()
@@ -433,6 +439,9 @@ class Acts:
         Raises `InputError` where a trace that is no file cannot be written; then the process must end.
         """
         self.recorder.written()
+        for call in self.then_stored:
+            call()
+        self.then_stored = []
 
     def let_go(self) -> list[Sending | Message]:
         """What leaves the host now that its cause is stored, or is never sent."""

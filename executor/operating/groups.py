@@ -121,12 +121,13 @@ class Groups:
             self.run.broken(InputError([Diagnostic(code, message, hint)]))
 
     async def write_last(self, patience: Patience) -> str:
-        """Write the lines of the trace that are left; returns a sentence where that had to be given up.
+        """Write the lines of the trace that are left, and what the journal has taken since its last sync.
 
-        Raises `InputError` F1017 where it fails.
+        Returns a sentence where that had to be given up. Raises `InputError` F1017 or F5034 where it fails.
         """
-        if (writing := self.run.recorder.writing()) is not None:
-            storing = asyncio.get_running_loop().run_in_executor(None, writing)
+        sync = self.run.journal.sync() if self.storing is None else None
+        if last := [one for one in (sync, self.run.recorder.writing()) if one is not None]:
+            storing = asyncio.get_running_loop().run_in_executor(None, _store, last)
             if await uncut([storing], patience):
                 return "the last lines of the trace are not written: the disk does not answer"
             storing.result()

@@ -29,6 +29,7 @@ from firable.executor.drivers.driver import Driver, Latched
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.links.link import Link
 from firable.executor.operating import ending, latch, lives, restart, stopping
+from firable.executor.operating.acquaintances import Acquaintances
 from firable.executor.operating.acts import Acts
 from firable.executor.operating.aside import UntoldError
 from firable.executor.operating.clock import RunClock
@@ -94,6 +95,7 @@ class Host:
         everything = (*coordinators(decomposition), *(subnet.name for subnet in decomposition.subnets))
         self.machines = everything if machines is None else machines
         self.link = link
+        self.acquaintances = Acquaintances(self.journal, is_linked=link is not None)
         self.is_whole = link is None
         self.speed = speed
         self.begin_seconds = begin_seconds
@@ -143,7 +145,8 @@ class Host:
         )
         self.coordinators, self.controllers = self.acts.coordinators, self.acts.controllers
         at_once, go_on = self.groups.at_once, self._go_on
-        self.peers = Peers(self.decomposition, self.acts, self.link, self.told, at_once, go_on, self.broken)
+        known, link = self.acquaintances, self.link
+        self.peers = Peers(self.decomposition, self.acts, known, link, self.told, at_once, go_on, self.broken)
         if self.peers.is_unmet:
             self.acts.halt()
         self.owner_of = {signal.name: name for name, c in self.controllers.items() for signal in c.subnet.signals}

@@ -10,15 +10,12 @@ decision whoever is gone (O6), and one that has not goes on alone as far as its 
 decide, and an idle cell would talk for ever. As soon as something new is said the repeats begin anew, and a peer that
 is back is told at once.
 
-*Memory*: a host keeps by which storage it met each machine, and is refused, or refuses, where that is another (F5025).
-It keeps it before anything leaves that rests on what the machine said, and what its own storage is called before
-anybody is told that. How old a storage was when it was last heard of it keeps with the next repeats, and when the peer
-is lost: to write that for each message would cost more than the message, and an age of some moments ago shows any copy
-that is older than they are. Until it has met one of those that its machines talk to, or where they talk to nobody any
-other host, ever, nothing moves here: a journal that was mistyped or left out looks like the first start of a cell, and
-only the others know better. If they do before that, or before anybody was met since this host was started, it ends:
-its places of the start are wrong. If they have heard later things of this very journal, it ends whoever was met: its
-places are old, and nobody but it knows of others.
+*Acquaintances*: a host keeps by which storage it met each machine, and how old that was when it was last heard of
+(`acquaintances.py`); it is refused, or refuses, where that is another, or an older copy (F5025). Until it has met one
+of those that its machines talk to, or where they talk to nobody any other host, ever, nothing moves here: a journal
+that was mistyped or left out looks like the first start of a cell, and only the others know better. If they do before
+that, or before anybody was met since this host was started, it ends: its places of the start are wrong. If they have
+heard later things of this very journal, it ends whoever was met: its places are old, and nobody but it knows of others.
 
 Where all machines are on one host there are no others, and this does nothing.
 """
@@ -27,12 +24,11 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from typing import Final
 
-from firable.executor.journal.journal import sync_now
-from firable.executor.journal.memory import HOSTS, keeping, remembered
-from firable.executor.links.link import Arrival, Estranged, Link, Memory, Storage, called, known_otherwise
+from firable.executor.links.link import Arrival, Link, called, known_otherwise
+from firable.executor.links.storages import Estranged, Memory, Storage
+from firable.executor.operating.acquaintances import KEEP_SECONDS, Acquaintances
 from firable.executor.operating.acts import Acts
 from firable.executor.operating.waits import reached, waits
 from firable.executor.protocol.deciders import coordinators
@@ -57,6 +53,7 @@ class Peers:
         self,
         decomposition: Decomposition,
         acts: Acts,
+        acquaintances: Acquaintances,
         link: Link | None,
         told: Callable[[str, str], None],
         work: Callable[[], None],
@@ -65,6 +62,7 @@ class Peers:
         repeat_seconds: float = REPEAT_SECONDS,
     ) -> None:
         self.acts = acts
+        self.acquaintances = acquaintances
         self.work = work
         self.begin = begin
         self.end = end
@@ -79,19 +77,13 @@ class Peers:
         }
         self.needed = tuple(sorted((deciding | voting) - here))
         """Those that some machine here talks to."""
-        kept = acts.journal.kept(HOSTS)
-        memory = remembered(kept, acts.journal.age)
-        self.storage, self.known = memory.storage, dict(memory.known)
-        self.ages: dict[str, int] = {}
-        """How old the storage of each was when it was last heard of, as far as that is not in `known`."""
-        if link is not None and not kept:
-            acts.journal.write(HOSTS, keeping(memory))
-            sync_now(acts.journal)
         self.connected_to: set[str] = set()
         self.met: set[str] = set()
         self.meeting = asyncio.Event()
         self.turned_away: dict[str, str] = {}
         """What is said of each that was refused and has not come back as it should."""
+        self.keep_due_seconds = 0.0
+        """When ages that were heard are made durable by themselves."""
         self.is_due = False
         """Whether all should have come by now."""
         self.timer: asyncio.TimerHandle | None = None
@@ -104,17 +96,13 @@ class Peers:
     @property
     def memory(self) -> Memory:
         """What this host is known by, and knows others by."""
-        for peer, age in self.ages.items():
-            if (known := self.known.get(peer)) is not None and age > known.age:
-                self.known[peer] = replace(known, age=age)
-        self.ages.clear()
-        return Memory(self.storage, dict(self.known))
+        return self.acquaintances.memory
 
     @property
     def is_unmet(self) -> bool:
         """Whether nobody who could know better was ever met: then nothing moves here."""
         others = self.needed or self.names
-        return self.link is not None and bool(others) and self.known.keys().isdisjoint(others)
+        return self.link is not None and bool(others) and self.acquaintances.known.keys().isdisjoint(others)
 
     @property
     def nobody_met(self) -> bool:
@@ -141,11 +129,15 @@ class Peers:
             watchdog.cancel()
             if self.timer is not None:
                 self.timer.cancel()
+            if self.acquaintances.has_heard:
+                self.acquaintances.write()  # the last sync of the host stores it
 
     def send(self, message: Message) -> None:
-        """Hand a message to the link."""
+        """Hand a message to the link; it is lost, and said again, as long as this life of the host is not kept."""
         if self.link is None:
             raise RuntimeError(f"nobody here takes {message!r}")
+        if not self.acquaintances.is_alive:
+            return
         controller, coordinator = message.controller, message.coordinator
         to_controller = isinstance(message, ToController)
         self.link.send(*((coordinator, controller) if to_controller else (controller, coordinator)), message)
@@ -188,21 +180,16 @@ class Peers:
 
     def arrived(self, sender: str, receiver: str, message: Message, age: int) -> None:
         """A message of another host; what its sender may not say is dropped."""
-        self._heard(sender, age)
+        self.acquaintances.heard(sender, age)
         if self._may_say(sender, receiver, message):
             self.acts.hear(receiver, message)
 
     def arrived_together(self, messages: Sequence[Arrival]) -> None:
         """The same of several, acted upon before this returns: to wait for a turn of the loop costs more."""
         for sender, _, _, age in messages:
-            self._heard(sender, age)
+            self.acquaintances.heard(sender, age)
         self.acts.hear_all([(to, message) for by, to, message, _ in messages if self._may_say(by, to, message)])
         self.work()
-
-    def _heard(self, sender: str, age: int) -> None:
-        """Take how old the storage of a peer is by now; messages may be overtaken."""
-        if age > self.ages.get(sender, 0):
-            self.ages[sender] = age
 
     def _may_say(self, sender: str, receiver: str, message: Message) -> bool:
         way = (message.coordinator, message.controller)
@@ -215,9 +202,9 @@ class Peers:
         """A peer can be reached: what it has missed is said again."""
         if peer in self.names:
             was_unmet = self.is_unmet
-            if peer not in self.known or self.known[peer].life != storage.life:
-                self.known[peer] = storage
-                self._remember()
+            if self.acquaintances.met(peer, storage):
+                self.acquaintances.write()
+                self.acts.have_kept(self._speak)
             if was_unmet:
                 self.begin()
             self.connected_to.add(peer)
@@ -225,19 +212,23 @@ class Peers:
             self.meeting.set()
             self.turned_away.pop(peer, None)
             self.told("connected", f"{called(peer)} is connected")
-            self.acts.repeat()
-            self.something_new()
+            self._say_again()
 
-    def _remember(self) -> None:
-        """Have the journal keep what is known of others."""
-        self.acts.remember(HOSTS, keeping(self.memory))
+    def _speak(self) -> None:
+        """This life is kept: what was not said because it was not is said now."""
+        if not self.acquaintances.is_alive:
+            self.acquaintances.is_alive = True
+            self._say_again()
+
+    def _say_again(self) -> None:
+        self.acts.repeat()
+        self.something_new()
 
     def lost(self, peer: str) -> None:
         """A peer can no longer be reached."""
         if peer in self.names:
             self.connected_to.discard(peer)
-            if self.ages:
-                self._remember()
+            self._keep_ages()
             waiting = [sentence for sentence in self.waits() if reached(peer, {peer}) in sentence]
             self.told("lost", "; ".join([f"{called(peer)} is lost", *waiting]))
 
@@ -267,6 +258,12 @@ class Peers:
             if name not in self.turned_away:
                 self.told("never-met", self._missing(name))
 
+    def _keep_ages(self) -> None:
+        """Have the journal keep now what was heard, though nothing else is to be kept."""
+        self.keep_due_seconds = asyncio.get_running_loop().time() + KEEP_SECONDS
+        self.acquaintances.write()
+        self.acts.have_kept()
+
     def _repeat_later(self, after_seconds: float) -> None:
         if self.timer is not None:
             self.timer.cancel()
@@ -274,8 +271,10 @@ class Peers:
         self.timer = asyncio.get_running_loop().call_later(self.pause_seconds, self._repeat)
 
     def _repeat(self) -> None:
-        if self.ages:
-            self._remember()
+        if self.acquaintances.has_heard:
+            self.acquaintances.write()
+            if asyncio.get_running_loop().time() >= self.keep_due_seconds:
+                self._keep_ages()
         self.acts.repeat()
         self._repeat_later(min(2 * self.pause_seconds, max(REPEAT_SECONDS_MAX, self.repeat_seconds)))
 

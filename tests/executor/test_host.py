@@ -14,7 +14,8 @@ from firable.executor.drivers.driver import Answer as DriversAnswer
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import MemoryJournal
 from firable.executor.links.in_process import Exchange, InProcessLink
-from firable.executor.links.link import COORDINATOR, Greeting, Storage
+from firable.executor.links.link import COORDINATOR, Greeting
+from firable.executor.links.storages import Storage
 from firable.executor.operating.host import Host
 from firable.executor.operating.peers import REPEAT_SECONDS, REPEAT_SECONDS_MAX
 from firable.executor.operating.recorder import Recorder

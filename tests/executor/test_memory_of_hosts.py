@@ -5,25 +5,31 @@ from contextlib import closing
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 import pytest
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
 from support.examples import examples
 from support.hosts import ONE_EACH, Cell
+from support.link_rigs import Heard
+from support.slow_disks import Slow
 
 from firable.decompose import split
 from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.drivers.bench import until
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.journal.memory import HOSTS, keeping, remembered
 from firable.executor.journal.sqlite_journal import SqliteJournal
 from firable.executor.links.in_process import Exchange, InProcessLink
-from firable.executor.links.link import COORDINATOR, Greeting, Memory, Storage
+from firable.executor.links.link import COORDINATOR, Greeting
+from firable.executor.links.storages import Memory, Met, Storage
+from firable.executor.operating.acquaintances import Acquaintances
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import KEY, TRACE, Recorder
 from firable.executor.operating.situation import Situation, State
-from firable.executor.protocol.messages import Readiness, Report
+from firable.executor.protocol.messages import Hello, Keep
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.net import Place
 from firable.nets.text import parse_net
@@ -163,8 +169,8 @@ def test_a_host_with_an_older_copy_of_its_journal_ends_and_the_others_go_on_when
 def test_a_host_with_an_older_copy_ends_also_where_others_were_met_that_have_heard_nothing_later() -> None:
     async def main() -> None:
         hosts, memory, journal = Hosts(), MemoryJournal(), MemoryJournal()
-        journal.write(HOSTS, keeping(Memory(Storage("of a"), {COORDINATOR: Storage("of c")})))
-        memory.write(HOSTS, keeping(Memory(Storage("of c"), {"a": Storage("of a", "before", 1000)})))
+        journal.write(HOSTS, keeping(Memory(Storage("of a"), {COORDINATOR: Met("of c")})))
+        memory.write(HOSTS, keeping(Memory(Storage("of c"), {"a": Met("of a", "before", 1000)})))
         run = hosts.host(("a",), journal)
         ending = asyncio.create_task(run.main())
         tasks = [asyncio.create_task(hosts.host(("b",), MemoryJournal()).main())]
@@ -184,19 +190,19 @@ def test_what_was_heard_of_a_storage_is_kept_while_all_is_well_and_when_its_host
     async def main() -> None:
         cell = Cell(tmp_path)
 
-        def kept() -> Storage:
-            return remembered(cell.journals[CENTRE].kept(HOSTS), 0).known["robot"]
+        def kept() -> Met:
+            return remembered(cell.journals[CENTRE].kept(HOSTS)).known["robot"]
 
-        await asyncio.sleep(0.1)
+        await asyncio.sleep(2)
         first = kept()
         await asyncio.sleep(9)
         later = kept()
         assert later.age > first.age
         assert (later.name, later.life) == (first.name, first.life)
-        peers = cell.hosts[CENTRE].peers
-        while "robot" not in peers.ages:
+        known = cell.hosts[CENTRE].acquaintances
+        while known.ages[first.life] == later.age:
             await asyncio.sleep(0.01)
-        age = peers.ages["robot"]
+        age = known.ages[first.life]
         assert kept().age < age <= cell.hosts[ROBOT].peers.age
         cell.exchange.cut(cell.links[ROBOT])
         assert kept() == replace(later, age=age)
@@ -204,80 +210,208 @@ def test_what_was_heard_of_a_storage_is_kept_while_all_is_well_and_when_its_host
         await cell.kill(ROBOT)
         cell.start(ROBOT, resume=True)
         await asyncio.sleep(9)
-        assert kept().life != first.life
+        assert kept().life == cell.hosts[ROBOT].acquaintances.storage.life != first.life
         assert kept().age > age
         await cell.stop()
 
     run_in_virtual_time(main())
 
 
-def test_an_age_that_was_overtaken_takes_nothing_back() -> None:
+def test_an_older_copy_stays_one_however_often_it_was_started_where_nobody_is(tmp_path: Path) -> None:
+    """Each start keeps something, so that the copy has been made durable as often as what it is a copy of."""
+
     async def main() -> None:
-        peers = Hosts().host((COORDINATOR,), MemoryJournal()).peers
-        peers.connected("a", Storage("of a", "first", 2))
-        for ages in ((3, 7, 5), (6,)):
-            for age in ages:
-                peers.arrived("a", COORDINATOR, Report("a", Readiness(0, frozenset())), age)
-            assert peers.memory.known["a"] == Storage("of a", "first", 7)
+        cell = Cell(tmp_path)
+        await asyncio.sleep(2.3)
+        copy = deepcopy(cell.journals[ROBOT])
+        await asyncio.sleep(5)
+        await cell.kill(ROBOT)
+        exchange, cell.exchange = cell.exchange, Exchange()
+        cell.journals[ROBOT], last = copy, cell.journals[ROBOT]
+        while copy.age < last.age + 5:
+            cell.start(ROBOT, resume=True)
+            await asyncio.sleep(1)
+            await cell.kill(ROBOT)
+        cell.exchange = exchange
+        cell.start(ROBOT, resume=True)
+        assert (await refusal(cell.tasks[ROBOT])).code == "F5025"
+        cell.journals[ROBOT] = last
+        cell.start(ROBOT, resume=True)
+        before = cell.firings()
+        await asyncio.sleep(30)
+        assert cell.firings() > before + 10
+        await cell.stop()
+
+    run_in_virtual_time(main())
+
+
+def test_what_was_heard_last_outlives_an_end_in_order(tmp_path: Path) -> None:
+    async def main() -> None:
+        hosts = Hosts()
+        journal = SqliteJournal(tmp_path / "a.journal", "d", ("a",))
+        run, other = hosts.host(("a",), journal), hosts.host(("b", COORDINATOR), MemoryJournal())
+        tasks = [asyncio.create_task(each.main()) for each in (run, other)]
+        await asyncio.sleep(2)
+        run.peers.arrived(COORDINATOR, "a", Hello("a", 0, -1, 0), 10**6)
+        tasks[0].cancel()
+        await tasks[0]
+        journal.close()
+        tasks[1].cancel()
+        await tasks[1]
+        again = SqliteJournal(tmp_path / "a.journal", "d", ("a",))
+        assert remembered(again.kept(HOSTS)).known[COORDINATOR].age == 10**6
+        again.close()
+
+    asyncio.run(main())
+
+
+@pytest.mark.parametrize("paused", [ONE_EACH, (ROBOT,)], ids=["all", "robot"])
+def test_hosts_that_do_nothing_keep_nothing_but_once_a_minute(
+    paused: tuple[tuple[str, ...], ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What waits is said again every few seconds, and each time an age is heard that may be a new one."""
+    synced: list[MemoryJournal] = []
+    monkeypatch.setattr(MemoryJournal, "sync", lambda journal: synced.append(journal))
+
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        await asyncio.sleep(3)
+        for machines in paused:
+            cell.hosts[machines].pause()
+        await asyncio.sleep(60)
+        synced.clear()
+        await asyncio.sleep(3600)
+        for journal in cell.journals.values():
+            assert synced.count(cast(MemoryJournal, journal)) <= 61
+        for machines in paused:
+            assert cell.hosts[machines].resume()
+        await asyncio.sleep(10)
+        await cell.stop()
+
+    run_in_virtual_time(main())
+
+
+def test_nothing_is_said_in_a_life_that_the_journal_does_not_keep_yet() -> None:
+    """A crash would lose the life, and who had heard of it would refuse the journal for ever."""
+
+    async def main() -> None:
+        hosts, journal = Hosts(), Slow()
+        run = hosts.host(("a",), journal)
+        task = asyncio.create_task(run.main())
+        await asyncio.sleep(0.05)
+        journal.is_slow = True
+        run.acts.repeat()
+        run.acts.have_kept()
+        await until(lambda: run.groups.storing is not None, "a sync")
+        assert len(run.acts.outbox) > 0, "a report waits for it"
+        heard = Heard()
+        link = asyncio.create_task(InProcessLink(hosts.exchange, Greeting("d", ("b", COORDINATOR))).run(heard))
+        await heard.until_told(("connected", "a"))
+        journal.answers.release()
+        before, life = run.groups.storing, run.acquaintances.storage.life
+        await until(lambda: run.groups.storing is not before, "the next sync")
+        await asyncio.sleep(0.05)
+        assert life not in str(journal.durable)
+        assert not heard.messages
+        journal.answers.release(100)
+        await heard.until(lambda: bool(heard.messages))
+        assert life in str(journal.durable)
+        for each in (task, link):
+            each.cancel()
+        await asyncio.gather(task, link, return_exceptions=True)
 
     asyncio.run(main())
 
 
 class Journals(RuleBasedStateMachine):
-    """A journal, its copies, and another host that hears how old it is; what it holds is told by marks.
+    """A journal, its copies and theirs, and another host; what they hold is told by marks.
 
-    A host is refused exactly where something has been heard that its journal does not hold; copies of what was given up
-    for another copy, unheard, are left out: they are of another journal with the same count.
+    One is let in exactly where it holds all of which the other host has heard.
     """
 
     def __init__(self) -> None:
         super().__init__()
-        self.names = iter(range(10**9))
-        self.holds: list[int] = []
-        self.copies: list[list[int]] = []
-        self.heard: set[int] = set()
-        self.other = Memory()
-        self.began = Storage("of a", "first", 0)
+        self.marks = iter(range(10**9))
+        self.other = Acquaintances(MemoryJournal(), is_linked=True)
+        self.heard: set[str] = set()
+        self.copies: list[MemoryJournal] = []
+        self.journal = MemoryJournal()
+        self.start(self.journal)
 
-    def is_refused(self, storage: Storage) -> bool:
-        return self.other.estranged(["a"], storage) is not None
+    def holds(self, journal: MemoryJournal) -> set[str]:
+        return set(journal.kept("a"))
+
+    def start(self, journal: MemoryJournal) -> None:
+        process = Acquaintances(journal, is_linked=True)
+        is_let_in = self.other.memory.estranged(["a"], process.storage) is None
+        assert is_let_in == (self.heard <= self.holds(journal))
+        self.keep(journal)
+        if is_let_in:
+            self.other.met("a", process.storage)
+            assert process.met("b", self.other.storage)
+            process.write()
+            process.is_alive = True
+            self.journal, self.process = journal, process
+
+    def keep(self, journal: MemoryJournal) -> None:
+        journal.write("a", [Keep(f"mark {next(self.marks)}", True)])
 
     @rule()
     def something_becomes_durable(self) -> None:
-        self.holds.append(next(self.names))
+        self.keep(self.journal)
 
     @rule()
     def a_message_is_heard(self) -> None:
-        self.heard |= set(self.holds)
-        self.other = Memory(known={"a": replace(self.began, age=len(self.holds))})
+        self.heard = self.holds(self.journal)
+        self.other.heard("a", self.journal.age)
 
     @rule()
     def the_line_is_cut_and_mended(self) -> None:
-        assert not self.is_refused(self.began)
+        assert self.other.memory.estranged(["a"], self.process.storage) is None
+        self.other.met("a", self.process.storage)
+        assert not self.process.met("b", self.other.storage)
+
+    @rule()
+    def the_other_host_is_started_anew(self) -> None:
+        self.other.write()
+        self.other = Acquaintances(self.other.journal, is_linked=True)
+        self.other.met("a", self.process.storage)
 
     @rule()
     def a_copy_is_made(self) -> None:
-        self.copies.append(list(self.holds))
+        self.copies.append(deepcopy(self.journal))
 
     @rule()
     def it_is_started_anew(self) -> None:
-        storage = Storage("of a", f"life {next(self.names)}", len(self.holds))
-        assert not self.is_refused(storage)
-        self.began = storage
+        self.start(self.journal)
 
     @precondition(lambda self: self.copies)
     @rule(data=st.data())
-    def it_is_started_with_a_copy(self, data: st.DataObject) -> None:
+    def a_copy_is_started_or_started_again(self, data: st.DataObject) -> None:
         copy = data.draw(st.sampled_from(self.copies))
-        storage = Storage("of a", f"life {next(self.names)}", len(copy))
-        assert self.is_refused(storage) == (not self.heard <= set(copy))
-        if not self.is_refused(storage):
-            self.holds, self.began = list(copy), storage
-            self.copies = [one for one in self.copies if one == copy[: len(one)]]
+        before = self.journal
+        self.start(copy)
+        if self.journal is copy:
+            self.copies = [before if one is copy else one for one in self.copies]
 
 
 TestJournals = Journals.TestCase
 TestJournals.settings = examples(100)
+
+
+def test_an_age_that_was_overtaken_takes_nothing_back() -> None:
+    known = Acquaintances(MemoryJournal(), is_linked=True)
+    known.met("a", Storage("of a").in_new_life("first", 2))
+    assert known.memory.known["a"] == Met("of a")
+    for ages in ((3, 7, 5), (6,)):
+        for age in ages:
+            known.heard("a", age)
+        assert known.memory.known["a"] == Met("of a", "first", 7)
+    known.write()
+    again = Acquaintances(known.journal, is_linked=True)
+    again.met("a", Storage("of a").in_new_life("first", 2))
+    again.heard("a", 5)
+    assert again.memory.known["a"] == Met("of a", "first", 7)
 
 
 def test_a_host_that_begins_anew_moves_nothing_before_it_has_met_another() -> None:
@@ -398,8 +532,9 @@ def test_what_a_host_remembers_outlives_it_in_its_journal(tmp_path: Path) -> Non
         memory = hosts.host(("a",), again).peers.memory
         assert memory.known == run.peers.memory.known
         assert memory.storage.name == run.peers.memory.storage.name
-        assert memory.storage.life != run.peers.memory.storage.life, "a new life"
-        assert memory.storage.age == again.age >= run.peers.age
+        before, now = memory.storage.lives
+        assert (before.name, before.began) == (run.peers.memory.storage.life, 0)
+        assert now.began == again.age >= run.peers.age
         storages = {(known.name, known.life) for known in memory.known.values()}
         assert storages == {(other.peers.memory.storage.name, other.peers.memory.storage.life)}
         again.close()
@@ -443,7 +578,7 @@ def test_a_host_whose_machines_talk_to_nobody_moves_nothing_either_before_anothe
 def test_a_host_that_has_met_only_those_who_cannot_know_it_ends_when_one_does() -> None:
     async def main() -> None:
         hosts, memory = Hosts(), MemoryJournal()
-        memory.write(HOSTS, keeping(Memory(Storage("of the coordinator"), {"a": Storage("of another journal")})))
+        memory.write(HOSTS, keeping(Memory(Storage("of the coordinator"), {"a": Met("of another journal")})))
         run = hosts.host(("a",), MemoryJournal())
         ending = asyncio.create_task(run.main())
         tasks = [asyncio.create_task(hosts.host(("b",), MemoryJournal()).main())]

@@ -24,7 +24,8 @@ from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.drivers.far_side.machine import ROLES
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.links.in_process import Exchange, InProcessLink
-from firable.executor.links.link import COORDINATOR, Greeting, Memory, Storage
+from firable.executor.links.link import COORDINATOR, Greeting
+from firable.executor.links.storages import Memory, Storage
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import KEY, TRACE, Recorder
 from firable.executor.operating.situation import State

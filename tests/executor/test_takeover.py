@@ -21,7 +21,8 @@ from firable.executor.journal.journal import MemoryJournal, sync_now
 from firable.executor.journal.memory import HOSTS, remembered
 from firable.executor.journal.sqlite_journal import SqliteJournal, machines_of
 from firable.executor.journal.takeover import take_over
-from firable.executor.links.link import COORDINATOR, Memory, Storage
+from firable.executor.links.link import COORDINATOR
+from firable.executor.links.storages import Memory, Met
 from firable.executor.operating.host import Host
 from firable.executor.operating.taken_up import opened
 from firable.executor.protocol.controller import LocalController
@@ -396,10 +397,10 @@ def test_a_cell_on_several_hosts_is_taken_over_together_and_its_hosts_know_each_
     for name, machines in HOSTS_OF_OLD.items():
         with closing(SqliteJournal(tmp_path / f"{name}.new", read.digest, machines)) as opened:
             kept |= {machine: opened.kept(machine) for machine in machines}
-            memories[name] = remembered(opened.kept(HOSTS), opened.age)
+            memories[name] = remembered(opened.kept(HOSTS))
     assert joint_marking(read.decomposition, kept) == {"robot.worked_out", "table.full"}
     storages = {
-        machine: Storage(memories[name].storage.name) for name, machines in HOSTS_OF_OLD.items() for machine in machines
+        machine: Met(memories[name].storage.name) for name, machines in HOSTS_OF_OLD.items() for machine in machines
     }
     assert len(set(storages.values())) == len(HOSTS_OF_OLD)
     for name, machines in HOSTS_OF_OLD.items():

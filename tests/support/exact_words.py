@@ -26,7 +26,8 @@ from firable.cli.view.moment import moment_of
 from firable.decompose.protocol.exploring import explore_protocol
 from firable.decompose.protocol.wrong import WRONG, example
 from firable.executor.journal.sqlite_journal import SqliteJournal
-from firable.executor.links.link import Estranged, Greeting, come_back_without, objection
+from firable.executor.links.link import Greeting, come_back_without, objection
+from firable.executor.links.storages import Estranged
 from firable.executor.links.zenoh_link import open_to_the_network
 from firable.executor.operating.control import Endpoint, listening
 from firable.nets.catalogue import catalogue_net

@@ -104,6 +104,7 @@ class Cell:
         """End a host at once, as a crash does: nothing more is written or sent."""
         host, task = self.hosts[machines], self.tasks[machines]
         assert host.outcome is not None
+        host.acquaintances.has_heard = False  # what it would keep at an end in order
         host.outcome.cancel()
         with suppress(asyncio.CancelledError):
             await task

@@ -11,17 +11,9 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from firable.executor.links.in_process import Exchange, InProcessLink
-from firable.executor.links.link import (
-    COORDINATOR,
-    Arrival,
-    Estranged,
-    Greeting,
-    Link,
-    Memory,
-    Storage,
-    known_otherwise,
-)
+from firable.executor.links.link import COORDINATOR, Arrival, Greeting, Link, known_otherwise
 from firable.executor.links.serial_line import MASTER, SerialLink, addresses_on_a_line
+from firable.executor.links.storages import Estranged, Memory, Met, Storage
 from firable.executor.links.zenoh_link import ZenohLink
 from firable.executor.protocol.messages import Message
 from firable.nets.diagnostics import Diagnostic
@@ -42,9 +34,7 @@ class Heard:
     waiters: list[asyncio.Future[None]] = field(default_factory=list)
     memory: Memory = field(default_factory=lambda: Memory(Storage(os.urandom(4).hex())))
 
-    @property
-    def age(self) -> int:
-        return self.memory.storage.age
+    age: int = 0
 
     def arrived_together(self, messages: Sequence[Arrival]) -> None:
         """The same of several."""
@@ -57,7 +47,7 @@ class Heard:
         self._wake()
 
     def connected(self, peer: str, storage: Storage) -> None:
-        self.memory = Memory(self.memory.storage, {peer: storage, **self.memory.known})
+        self.memory = Memory(self.memory.storage, {peer: Met(storage.name), **self.memory.known})
         self.told.append(("connected", peer))
         self._wake()
 

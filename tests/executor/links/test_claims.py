@@ -12,8 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.examples import examples
 
-from firable.executor.links.claims import Claims, Said, session_of
-from firable.executor.links.link import Arrival, Estranged, Memory, Storage, known_otherwise
+from firable.executor.links.claims import Claims, Said
+from firable.executor.links.link import Arrival, known_otherwise
+from firable.executor.links.storages import Estranged, Memory, Met, Storage
 from firable.executor.protocol.messages import Message
 from firable.nets.diagnostics import Diagnostic
 
@@ -24,7 +25,7 @@ class Party:
     def __init__(self, wires: Wires, number: int, names: tuple[str, ...], memory: Memory) -> None:
         self.wires = wires
         self.names = names
-        self.session = session_of(f"p{number}", memory.storage)
+        self.session = f"p{number}"
         self.memory = memory
         self.before = memory
         """What it remembered when it was started."""
@@ -41,17 +42,17 @@ class Party:
 
     def arrived(self, sender: str, receiver: str, message: Message, age: int) -> None: ...
 
-    @property
-    def age(self) -> int:
-        return self.memory.storage.age
+    age = 0
 
     def connected(self, peer: str, storage: Storage) -> None:
         assert peer not in self.connected_to
         self.connected_to[peer] = storage
         self.was_connected.append(peer)
-        known = self.memory.known.get(peer)
-        if known is None or known.life != storage.life:
-            self.memory = Memory(self.memory.storage, {**self.memory.known, peer: storage})
+        self.memory = Memory(self.memory.storage, {peer: Met(storage.name), **self.memory.known})
+        if self.wires.dice.random() < 0.5:  # something is heard of it
+            began = storage.lives[-1].began if storage.lives else 0
+            heard = Met(storage.name, storage.life, began + self.wires.dice.randrange(2))
+            self.memory = Memory(self.memory.storage, {**self.memory.known, peer: heard})
 
     def lost(self, peer: str) -> None:
         del self.connected_to[peer]
@@ -81,7 +82,7 @@ class Wires:
         for other in self.parties:
             if not set(other.names) & set(names):  # or each is refused by the other, and not claimed
                 for one, its in ((party, other), (other, party)):
-                    self.wire(one, its).append(partial(its.claims.claimed, one.session, one.names))
+                    self.wire(one, its).append(partial(its.claims.claimed, one.session, one.names, one.memory.storage))
         self.parties.append(party)
         return party
 
@@ -134,26 +135,26 @@ def knows_otherwise(one: Party, other: Party, *, when_started: bool = False) -> 
 
 DICE = st.integers(0, 10**6).map(random.Random)
 NAMES = st.sampled_from(["s0", "s1", "s2"])
-STORAGES = st.builds(Storage, NAMES, st.sampled_from(["earlier", "latest"]), st.integers(0, 2))
-MEMORIES = st.lists(st.dictionaries(st.sampled_from(["a", "b", "c", "d"]), STORAGES), min_size=3, max_size=3)
+MET = st.builds(Met, NAMES, st.sampled_from(["", "first", "another"]), st.integers(0, 2))
+MEMORIES = st.lists(st.dictionaries(st.sampled_from(["a", "b", "c", "d"]), MET), min_size=3, max_size=3)
 
 
 @examples(200)
 @given(DICE, MEMORIES, st.lists(st.integers(0, 8), min_size=1, max_size=6))
 def test_hosts_of_different_machines_end_connected_exactly_if_none_knows_another_otherwise(
-    dice: random.Random, memories: list[dict[str, Storage]], pauses: list[int]
+    dice: random.Random, memories: list[dict[str, Met]], pauses: list[int]
 ) -> None:
     """Whatever is delivered first, and however often they were ended and started again meanwhile."""
     wires, all_names = Wires(dice), (("a", "b"), ("c",), ("d",))
-    storages = [Storage(f"s{i}", "latest", 1) for i in range(3)]
+    storages = [Storage(f"s{i}").in_new_life("first", 0).in_new_life("second", 1) for i in range(3)]
     now = [wires.start(names, Memory(storages[i], memories[i])) for i, names in enumerate(all_names)]
     for pause in pauses:
         wires.deliver(pause)
         number = dice.randrange(3)
         wires.end(now[number])
         wires.deliver(dice.randrange(4))
-        storage = replace(storages[number], life=f"life {wires.started}", age=dice.randrange(3))
-        now[number] = wires.start(now[number].names, replace(now[number].memory, storage=storage))
+        storages[number] = storages[number].in_new_life(f"life {wires.started}", dice.randrange(3))
+        now[number] = wires.start(now[number].names, replace(now[number].memory, storage=storages[number]))
     wires.all_delivered()
     for one in now:
         for other in now:
@@ -194,10 +195,10 @@ def test_of_two_hosts_with_a_machine_in_common_one_is_connected_and_the_other_wh
 @given(DICE)
 def test_a_host_that_is_refused_for_one_machine_is_never_known_by_another(dice: random.Random) -> None:
     wires = Wires(dice)
-    centre = wires.start(("c",), Memory(Storage("s0"), {"b": Storage("s1")}))
+    centre = wires.start(("c",), Memory(Storage("s0"), {"b": Met("s1")}))
     stranger = wires.start(("a", "b"), Memory(Storage("s2")))
     wires.all_delivered()
     assert not centre.was_connected
     assert not stranger.was_connected
-    assert centre.memory.known == {"b": Storage("s1")}
+    assert centre.memory.known == {"b": Met("s1")}
     assert stranger.disowned_by == {"c"}

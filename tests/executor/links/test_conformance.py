@@ -10,7 +10,8 @@ import pytest
 from support.link_rigs import PATIENCE_SECONDS, Heard, Rig, in_process, over_a_serial_line, over_zenoh, running
 
 from firable.executor.links.lending import LendingLoop
-from firable.executor.links.link import COORDINATOR, Greeting, Link, Memory, Storage
+from firable.executor.links.link import COORDINATOR, Greeting, Link
+from firable.executor.links.storages import LIVES_MAX, Memory, Met, Storage
 from firable.executor.protocol.messages import Acknowledgement, Decision, Message, Readiness, Report, Vote, VoteRequest
 
 Make = Callable[[], AbstractAsyncContextManager[Rig]]
@@ -169,26 +170,27 @@ class TestLink:
         async def main() -> None:
             async with make() as rig:
                 there = rig.link(ROBOT)
-                memory = Memory(Storage("r1", "first", 3))
-                async with running(rig.link(CENTRE)) as centre, running(there, memory) as robot:
+                async with running(rig.link(CENTRE)) as centre, running(there) as robot:
                     await robot.until_told(("connected", COORDINATOR))
-                    await deliver(there, centre, "robot", COORDINATOR, TO_COORDINATOR[:1])
-                    robot.memory = replace(robot.memory, storage=Storage("r1", "first", 1 << 40))
-                    await deliver(there, centre, "robot", COORDINATOR, TO_COORDINATOR[1:2])
+                    for age in (3, 1 << 40):
+                        robot.age = age
+                        await deliver(there, centre, "robot", COORDINATOR, TO_COORDINATOR)
+                        centre.messages.clear()
                 assert set(centre.ages) == {3, 1 << 40}
-                assert centre.memory.known["robot"] == Storage("r1", "first", 3)
 
         run(make, main())
 
+    @pytest.mark.parametrize(("life", "age"), [("first", 8), ("of another copy", 1)])
     def test_a_host_that_comes_back_with_an_older_copy_is_refused_and_one_with_all_that_was_heard_is_not(
-        self, make: Make
+        self, make: Make, life: str, age: int
     ) -> None:
         async def main() -> None:
             async with make() as rig:
-                memory = Memory(Storage("c1"), {"robot": Storage("r1", "first", 7)})
+                before = Storage("r1").in_new_life("first", 0)
+                memory = Memory(Storage("c1"), {"robot": Met("r1", life, age)})
                 async with running(rig.link(CENTRE), memory) as centre:
                     there = rig.link(ROBOT)
-                    async with running(there, Memory(Storage("r1", "second", 6))) as robot:
+                    async with running(there, Memory(before.in_new_life("second", 7))) as robot:
                         await centre.until_told(("refused", "robot"))
                         await robot.until_told(("disowned", COORDINATOR))
                         there.send("robot", COORDINATOR, TO_COORDINATOR[0])
@@ -197,19 +199,35 @@ class TestLink:
                         assert ("connected", COORDINATOR) not in robot.told
                         assert "an older copy" in robot.problems[0].message
                     assert "an older copy" in centre.problems[0].message
-                    async with running(rig.link(ROBOT), Memory(Storage("r1", "third", 7))):
+                    whole = Storage("r1").in_new_life(life, 0).in_new_life("third", age)
+                    async with running(rig.link(ROBOT), Memory(whole)):
                         await centre.until_told(("connected", "robot"))
 
         run(make, main())
 
-    def test_within_a_life_the_age_that_a_host_began_with_is_none_against_it(self, make: Make) -> None:
+    def test_of_two_hosts_that_each_know_the_other_as_an_older_copy_both_are_told(self, make: Make) -> None:
         async def main() -> None:
             async with make() as rig:
-                memory = Memory(Storage("r1", "first", 1))
+                centre_knows = Memory(Storage("c1").in_new_life("now", 1), {"robot": Met("r1", "lost", 1)})
+                robot_knows = Memory(Storage("r1").in_new_life("now", 1), {COORDINATOR: Met("c1", "lost", 1)})
+                async with (
+                    running(rig.link(CENTRE), centre_knows) as centre,
+                    running(rig.link(ROBOT), robot_knows) as robot,
+                ):
+                    await centre.until_told(("disowned", "robot"))
+                    await robot.until_told(("disowned", COORDINATOR))
+                    assert "connected" not in {told for told, _ in (*centre.told, *robot.told)}
+
+        run(make, main())
+
+    def test_within_a_life_whatever_was_heard_of_it_is_none_against_it(self, make: Make) -> None:
+        async def main() -> None:
+            async with make() as rig:
+                memory = Memory(Storage("r1").in_new_life("first", 1))
                 async with running(rig.link(CENTRE)) as centre, running(rig.link(ROBOT), memory) as robot:
                     await centre.until_told(("connected", "robot"))
                     await robot.until_told(("connected", COORDINATOR))
-                    centre.memory = replace(centre.memory, known={"robot": Storage("r1", "first", 9)})
+                    centre.memory = replace(centre.memory, known={"robot": Met("r1", "first", 9)})
                     rig.cut()
                     await robot.until_told(("lost", COORDINATOR))
                     await centre.until_told(("lost", "robot"))
@@ -219,11 +237,26 @@ class TestLink:
 
         run(make, main())
 
+    @pytest.mark.parametrize("lives", [LIVES_MAX])
+    def test_a_storage_of_many_lives_is_told_whole(self, make: Make, lives: int) -> None:
+        async def main() -> None:
+            storage = Storage("0123abcd")
+            for life in range(lives):
+                storage = storage.in_new_life(f"{life:08x}", 10**6 + life)
+            async with make() as rig:
+                others = {f"machine_{i}": Met(storage.name, "00000000", 10**6) for i in range(200)}
+                memory = Memory(Storage("c1"), {"robot": Met(storage.name, "00000000", 10**6 + 1), **others})
+                async with running(rig.link(CENTRE), memory) as centre, running(rig.link(ROBOT), Memory(storage)):
+                    await centre.until_told(("connected", "robot"))
+                    assert not centre.problems
+
+        run(make, main())
+
     def test_of_two_machines_of_a_host_one_that_is_known_otherwise_keeps_both_away(self, make: Make) -> None:
         async def main() -> None:
             async with make() as rig:
                 both = rig.link(replace(ROBOT, names=("system", "robot")))
-                centre_knows = Memory(Storage("c1"), {"system": Storage("r1")})
+                centre_knows = Memory(Storage("c1"), {"system": Met("r1")})
                 async with (
                     running(rig.link(CENTRE), centre_knows) as centre,
                     running(both, Memory(Storage("r2"))) as stranger,

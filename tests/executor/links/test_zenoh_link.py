@@ -14,7 +14,8 @@ from support.link_rigs import PATIENCE_SECONDS, Heard, free_port, running
 
 from firable.executor.drivers.bench import until
 from firable.executor.links.encoding import pack
-from firable.executor.links.link import COORDINATOR, PROTOCOL_VERSION, Greeting, Memory, Storage
+from firable.executor.links.link import COORDINATOR, PROTOCOL_VERSION, Greeting
+from firable.executor.links.storages import Memory, Storage
 from firable.executor.links.zenoh_link import Certificates, ZenohLink, open_to_the_network
 from firable.executor.protocol.messages import Decision, Readiness, Report
 from firable.nets.diagnostics import InputError, Severity
