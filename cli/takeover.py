@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, closing
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -16,6 +16,7 @@ from firable.cli.options import analysis_options, budget, refuse_a_net
 if TYPE_CHECKING:
     from firable.analysis.spaces.reachability import Budget
     from firable.executor.journal.takeover import Takeover
+    from firable.executor.links.storages import Memory
     from firable.executor.protocol.messages import Stored
     from firable.nets.net import Net
     from firable.nets.verdict import Verdict
@@ -57,8 +58,10 @@ def takeover(
     the same command in every place that has a token. The journals of OLD are left as they are. `firable run NEW
     --journal` then goes on: held, until the machines are asked where they are and the operator resumes.
     """
+    from firable.executor.journal.memory import HOSTS, remembered
     from firable.executor.journal.sqlite_journal import SqliteJournal, machines_of
     from firable.executor.journal.takeover import dealt_out, take_over
+    from firable.executor.operating.dispatch import TAKEN
     from firable.executor.operating.hosting import machines_of as hosted
     from firable.executor.operating.running import load
     from firable.executor.protocol.deciders import TOP, coordinators
@@ -75,10 +78,15 @@ def takeover(
     deciding = coordinators(after.decomposition)
     machines = {file: machines_of(file) for file in journals}
     kept: dict[str, dict[str, Stored]] = {}
+    memories: dict[str, Memory] = {}
+    taken: dict[str, Mapping[str, Stored]] = {}
     with ExitStack() as held:  # nobody runs the old bundle on while it is taken over
         for file, names in machines.items():
             read = held.enter_context(closing(SqliteJournal(file, before.digest, names)))
             kept |= {name: dict(read.kept(name)) for name in names}
+            memories[file] = remembered(read.kept(HOSTS), read.age)
+            taken[file] = read.kept(TAKEN)
+        _refuse_copies(machines, memories)
         everything = [*coordinators(before.decomposition), *(subnet.name for subnet in before.decomposition.subnets)]
         controllers = dealt_out(machines, everything, [subnet.name for subnet in after.decomposition.subnets])
         at_top = [file for file, names in machines.items() if TOP in names and after.net.coordinator is None]
@@ -88,9 +96,11 @@ def takeover(
         moved = take_over(before.decomposition, after.decomposition, kept, deciding)
         _demand_reachable(after.net, moved.marking, budget(max_markings, max_memory, max_seconds))
         targets = dict(zip(journals, into, strict=True))
-        if len(journals) == 1 and Path(f"{journals[0]}.cell").is_file():  # the simulated cell, if the journal is of one
-            write_whole(f"{into[0]}.cell", Path(f"{journals[0]}.cell").read_bytes())
-        _write({targets[file]: names for file, names in dealt.items() if names}, after.digest, moved)
+        written = {targets[file]: names for file, names in dealt.items() if names}
+        with _removed_if_it_fails(written):
+            if len(journals) == 1 and Path(f"{journals[0]}.cell").is_file():  # the simulated cell, if there is one
+                write_whole(f"{into[0]}.cell", Path(f"{journals[0]}.cell").read_bytes())
+            _write(written, after.digest, moved, {targets[file]: of for file, of in taken.items()})
     click.echo(f"{', '.join(into)}: '{after.net.name}' goes on with tokens on {', '.join(moved.marking)}")
     if moved.under_way:
         click.echo(f"  under way, and asked after at the start: the commands of {', '.join(moved.under_way)}")
@@ -106,12 +116,48 @@ def takeover(
     return 0
 
 
-def _write(journals: Mapping[str, Sequence[str]], digest: str, moved: Takeover) -> None:
-    """Write the journals, with their machines: aside first, so that none is there that is not whole."""
+@contextmanager
+def _removed_if_it_fails(journals: Collection[str]) -> Iterator[None]:
+    """Leave none of these journals, where none stood, unless all are there: part of a cell must not be started."""
+    names = [f"{file}{end}" for file in journals for end in ("", ".generation", ".cell")]
+    new = [name for name in names if not Path(name).exists()]
+    try:
+        yield
+    except BaseException:
+        for name in new:
+            with suppress(OSError, ValueError):
+                Path(name).unlink(missing_ok=True)
+        raise
+
+
+def _refuse_copies(machines: Mapping[str, Sequence[str]], memories: Mapping[str, Memory]) -> None:
+    """Raise `InputError` F5050 where a journal remembers what another one does not hold: that is an older copy."""
+    from firable.executor.links.link import called
+    from firable.nets.diagnostics import Diagnostic, InputError
+    from firable.nets.source import printable
+
+    problems = []
+    for file, memory in memories.items():
+        for by, other in memories.items():
+            if by != file and (why := other.estranged(machines[file], memory.storage)) is not None:
+                what = "an older copy: it does not hold" if why.is_older else "another one than"
+                who = ", ".join(map(called, why.machines))
+                message = f"{printable(file)}: the journal is {what} what {printable(by)} knows of {who}"
+                hint = "name the journals as their hosts have left them at the end of one and the same run"
+                problems.append(Diagnostic("F5050", message, hint))
+    if problems:
+        raise InputError(problems)
+
+
+def _write(
+    journals: Mapping[str, Sequence[str]], digest: str, moved: Takeover, taken: Mapping[str, Mapping[str, Stored]]
+) -> None:
+    """Write the journals, with their machines and what these have taken: aside first, so that none is not whole."""
     from firable.executor.journal.journal import sync_now
     from firable.executor.journal.memory import HOSTS, keeping, new_name
     from firable.executor.journal.sqlite_journal import SqliteJournal, witness_of
     from firable.executor.links.storages import Memory, Met, Storage
+    from firable.executor.operating.dispatch import TAKEN
     from firable.executor.protocol.messages import Keep
     from firable.nets.writing import write_whole
 
@@ -127,6 +173,7 @@ def _write(journals: Mapping[str, Sequence[str]], digest: str, moved: Takeover) 
             with closing(SqliteJournal(written, digest, names)) as journal:
                 for name in names:  # of a coordinator that decides nothing there is nothing to keep
                     journal.write(name, [Keep(key, value) for key, value in moved.kept.get(name, {}).items()])
+                journal.write(TAKEN, [Keep(place, entry) for place, entry in taken[file].items()])
                 if others.known:
                     journal.write(HOSTS, keeping(others))
                 sync_now(journal)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Final
 
 from firable.executor.links.storages import Memory, Met, Storage
@@ -26,26 +27,24 @@ def new_name() -> str:
     return os.urandom(4).hex()
 
 
-def remembered(kept: Mapping[str, Stored]) -> Memory:
-    """The memory that a journal has kept; of nobody, and with a new name, where it has kept none."""
+def remembered(kept: Mapping[str, Stored], age: int) -> Memory:
+    """The memory that a journal of this age has kept, in a new life; of nobody and by a new name where it kept none.
+
+    The new life begins where the last one ended: what processes have kept since that nobody let in is of none.
+    """
     known = {key.removeprefix(_OF): Met.read(str(met)) for key, met in kept.items() if key.startswith(_OF)}
-    return Memory(Storage.read(str(kept.get(_STORAGE) or new_name())), known)
-
-
-def ended_at(kept: Mapping[str, Stored], age: int) -> int:
-    """How old a journal of this age was when its last life ended; since then nobody has let its process in."""
     since = kept.get(_SINCE)
-    return since if isinstance(since, int) else age
+    ended = since if isinstance(since, int) else age
+    return Memory(Storage.read(str(kept.get(_STORAGE) or new_name())).in_new_life(new_name(), ended), known)
 
 
-def keeping_end(age: int | None) -> list[Keep]:
-    """What keeps that the last life ended at this age; None where the present one has begun."""
-    return [Keep(_SINCE, age)]
+def keeping_no_life(memory: Memory) -> list[Keep]:
+    """What keeps a memory whose present life has not begun: nobody has let it in."""
+    storage = replace(memory.storage, lives=memory.storage.lives[:-1])
+    return [Keep(_STORAGE, str(storage)), Keep(_SINCE, memory.storage.lives[-1].began)]
 
 
 def keeping(memory: Memory) -> list[Keep]:
     """What keeps a memory."""
-    return [
-        Keep(_STORAGE, str(memory.storage)),
-        *(Keep(f"{_OF}{name}", str(met)) for name, met in memory.known.items()),
-    ]
+    known = (Keep(f"{_OF}{name}", str(met)) for name, met in memory.known.items())
+    return [Keep(_STORAGE, str(memory.storage)), Keep(_SINCE, None), *known]

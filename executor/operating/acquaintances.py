@@ -16,7 +16,7 @@ from __future__ import annotations
 from typing import Final
 
 from firable.executor.journal.journal import Journal, sync_now
-from firable.executor.journal.memory import HOSTS, ended_at, keeping, keeping_end, new_name, remembered
+from firable.executor.journal.memory import HOSTS, keeping, keeping_no_life, remembered
 from firable.executor.links.storages import Memory, Met, Storage
 
 KEEP_SECONDS: Final = 60.0
@@ -29,15 +29,12 @@ class Acquaintances:
     def __init__(self, journal: Journal, *, is_linked: bool) -> None:
         self.journal = journal
         kept = journal.kept(HOSTS)
-        memory = remembered(kept)
-        ended = ended_at(kept, journal.age)
+        memory = remembered(kept, journal.age)
         if is_linked:
-            journal.write(HOSTS, keeping_end(ended))  # with whatever this process keeps first
+            journal.write(HOSTS, keeping_no_life(memory))  # with whatever this process keeps first
             if not kept:
-                journal.write(HOSTS, keeping(memory))
                 sync_now(journal)
-        self.storage = memory.storage.in_new_life(new_name(), ended)
-        self.known = dict(memory.known)
+        self.storage, self.known = memory.storage, dict(memory.known)
         self.lives: dict[str, str] = {}
         """The life of its storage in which each machine was met."""
         self.ages: dict[str, int] = {}
@@ -75,4 +72,4 @@ class Acquaintances:
     def write(self) -> None:
         """Have the journal keep what is known, and that this life has begun, with its next sync."""
         self.has_heard = False
-        self.journal.write(HOSTS, [*keeping(self.memory), *keeping_end(None)])
+        self.journal.write(HOSTS, keeping(self.memory))

@@ -4,6 +4,9 @@ A net cannot tell a slow machine from a dead one; only time does. So a command t
 with a completion is over when that has come, one without when its machine has taken it. A place with `within` says in
 the net what follows when its time is over (`time_limits.py`), and needs no alarm.
 
+That a machine has taken a command outlives this process: one that was switched off and on since shows that it has never
+had it, and is not believed (`was_taken`). It may have done it by halves, and would do it twice.
+
 When a token leaves a place before its command was over, what has not reached the machine is given up: no machine moves
 by it when its line is back.
 """
@@ -11,14 +14,25 @@ by it when its line is back.
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from firable.executor.drivers.driver import withdraw
+from firable.executor.journal.journal import Journal
 from firable.executor.operating.items import CommandTaken
+from firable.executor.protocol.messages import Keep
 from firable.nets.net import Net, Place
 
 if TYPE_CHECKING:
     from firable.executor.operating.host import Host
+
+
+TAKEN: Final = "\ntaken"
+"""The name under which the journal keeps the number of the command that was taken last, by its place."""
+
+
+def was_taken(journal: Journal, place: str, entry: int) -> bool:
+    """Whether a machine has taken this command of a place, in this life of the host or one before."""
+    return journal.kept(TAKEN).get(place) == entry
 
 
 class Dispatch:
@@ -49,7 +63,10 @@ class Dispatch:
     def taken(self, place: str, entry: int) -> None:
         """A machine has the command of a place; a token without completion has waited for that."""
         sender = self.run.net.place(place)
-        if sender.completion is None:
+        if sender.completion is not None:
+            self.run.journal.write(TAKEN, [Keep(place, entry)])
+            self.run.acts.have_kept()
+        else:
             self.untaken.discard(place)
             self.over(place)
             self.run.acts.hear(str(sender.owner), CommandTaken(place, entry))

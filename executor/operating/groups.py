@@ -121,11 +121,11 @@ class Groups:
             self.run.broken(InputError([Diagnostic(code, message, hint)]))
 
     async def write_last(self, patience: Patience) -> str:
-        """Write the lines of the trace that are left, and what the journal has taken since its last sync.
+        """Write the lines of the trace that are left and, of a host among others, what was heard of them last.
 
         Returns a sentence where that had to be given up. Raises `InputError` F1017 or F5034 where it fails.
         """
-        sync = self.run.journal.sync() if self.storing is None else None
+        sync = self.run.journal.sync() if self.run.link is not None and self.storing is None else None
         if last := [one for one in (sync, self.run.recorder.writing()) if one is not None]:
             storing = asyncio.get_running_loop().run_in_executor(None, _store, last)
             if await uncut([storing], patience):

@@ -147,6 +147,8 @@ class Host:
         at_once, go_on = self.groups.at_once, self._go_on
         known, link = self.acquaintances, self.link
         self.peers = Peers(self.decomposition, self.acts, known, link, self.told, at_once, go_on, self.broken)
+        # Before anybody has let this host in, it may be refused, and changes no file.
+        self.recorder.may_write = known.is_alive or link is None or not self.peers.names
         if self.peers.is_unmet:
             self.acts.halt()
         self.owner_of = {signal.name: name for name, c in self.controllers.items() for signal in c.subnet.signals}

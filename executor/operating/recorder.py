@@ -20,6 +20,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import stat
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
@@ -50,29 +51,40 @@ class LineStream(Protocol):
         ...
 
 
+_SHORT: Final = "it is shorter than its journal says; was it changed, or the power cut?"
+
+
 class TraceFile:
-    """A trace on disk, opened anew, or cut after `size_bytes` bytes: what fails is `InputError` F1017, nothing else."""
+    """A trace on disk, begun anew, or gone on with after `size_bytes` bytes: what fails is `InputError` F1017.
+
+    What stands behind them, or there at all where it is begun anew, stays until the first line is written.
+    """
 
     def __init__(self, path: Path | str, size_bytes: int = 0) -> None:
         self.path = path
         self.is_writing = False
+        self.cut_at: int | None = size_bytes
+        """Where the file is cut before the first line; None when that is done."""
         with self._failures():
-            self.file = FileIO(path, "r+" if size_bytes else "w")  # no buffer, whose lock a write that hangs would hold
-            if size_bytes:
-                self._cut(size_bytes)
+            mode = "r+" if size_bytes or Path(path).is_file() else "w"
+            self.file = FileIO(path, mode)  # no buffer, whose lock a write that hangs would hold
+            if size_bytes and self.file.seek(0, os.SEEK_END) < size_bytes:
+                self.file.close()
+                raise ValueError(_SHORT)
 
     def _cut(self, size_bytes: int) -> None:
-        if self.file.seek(0, os.SEEK_END) < size_bytes:
-            self.file.close()
-            raise ValueError("it is shorter than its journal says; was it changed, or the power cut?")
-        self.file.truncate(size_bytes)
-        self.file.seek(size_bytes)
+        if stat.S_ISREG(os.fstat(self.file.fileno()).st_mode):  # of a pipe or a device nothing can be cut
+            self.file.truncate(size_bytes)
+            self.file.seek(size_bytes)
 
     def write(self, lines: str, /) -> None:
         """Write lines with their ends, whole; on any thread."""
         self.is_writing = True
         try:
             with self._failures():
+                if self.cut_at is not None:
+                    self._cut(self.cut_at)
+                    self.cut_at = None
                 rest = memoryview(lines.encode())
                 while rest:
                     rest = rest[self.file.write(rest) or 0 :]
@@ -96,6 +108,10 @@ class TraceFile:
             reason = error.strerror if isinstance(error, OSError) else str(error)
             message = f"{printable(str(self.path))}: the trace cannot be written: {reason}"
             hint = "name a file in a folder that you may write to"
+            if reason == _SHORT:
+                hint = (
+                    "put the trace of this run back as it was, or leave --trace out: it cannot be begun in the middle"
+                )
             if isinstance(error, OSError) and error.errno in {errno.ENOSPC, errno.EDQUOT}:
                 hint = "make room on its disk; with --journal, the same command then takes the run up"
             raise InputError([Diagnostic("F1017", message, hint)]) from None
@@ -133,6 +149,8 @@ class Recorder:
         places = self.player.places
         self._firable = EnabledSet([(c.needs & places, c.forbids & places) for c in openable], len(net.places))
         self.stream = stream
+        self.may_write = True
+        """Whether lines may be written: not as long as the run may be refused, which changes no file."""
         self.firings: dict[str, int] = {transition.name: 0 for transition in net.transitions}
         self.commands = 0
         self.size_bytes = 0
@@ -239,7 +257,7 @@ class Recorder:
 
         `written` follows when it is done. What is returned raises `InputError` F1017 where the file cannot be written.
         """
-        self.begun = len(self.unwritten)
+        self.begun = len(self.unwritten) if self.may_write else 0
         if self.begun == 0 or not isinstance(self.stream, TraceFile):
             return None
         return partial(self.stream.write, "".join(self.unwritten))  # others come while they are written

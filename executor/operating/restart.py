@@ -2,8 +2,9 @@
 
 The controllers come back from the journal *held* (`protocol.controller`). For every command that was issued and is not
 known to be over, the driver is asked. *Done*: the completion is taken in. *Working*: it will come. *Not received*: it
-is sent when the run is resumed, under the number it has. *Unknown*: only a person who looks at the machine can tell,
-and until somebody has, the run cannot be resumed. A guess would be a command given twice, or never.
+is sent when the run is resumed, under the number it has; but where the machine had taken it, it was switched off since,
+and that is *unknown*, too. *Unknown*: only a person who looks at the machine can tell, and until somebody has, the run
+cannot be resumed. A guess would be a command given twice, or never.
 
 What a person says counts only where the driver does not know: machines are believed before people.
 """
@@ -15,6 +16,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 from firable.executor.links.link import called
+from firable.executor.operating.dispatch import was_taken
 from firable.executor.protocol.commands import Answer
 
 if TYPE_CHECKING:
@@ -53,6 +55,9 @@ async def take_up(run: Host, found: TakingUp) -> None:
     for name, controller in run.controllers.items():
         for place, entry in controller.commands.questions:
             answer = Answer((await run.driver.ask(run.net.place(place), entry)).value)
+            if answer is Answer.NOT_RECEIVED and was_taken(run.journal, place, entry):
+                answer = Answer.UNKNOWN
+                run.told("held", f"the machine of '{place}' had taken its command, and knows nothing of it any more")
             if answer is Answer.UNKNOWN:
                 answer = run.said.get(place, answer)
             found.answers[place] = answer

@@ -191,7 +191,7 @@ def test_what_was_heard_of_a_storage_is_kept_while_all_is_well_and_when_its_host
         cell = Cell(tmp_path)
 
         def kept() -> Met:
-            return remembered(cell.journals[CENTRE].kept(HOSTS)).known["robot"]
+            return remembered(cell.journals[CENTRE].kept(HOSTS), 0).known["robot"]
 
         await asyncio.sleep(2)
         first = kept()
@@ -259,7 +259,7 @@ def test_what_was_heard_last_outlives_an_end_in_order(tmp_path: Path) -> None:
         tasks[1].cancel()
         await tasks[1]
         again = SqliteJournal(tmp_path / "a.journal", "d", ("a",))
-        assert remembered(again.kept(HOSTS)).known[COORDINATOR].age == 10**6
+        assert remembered(again.kept(HOSTS), again.age).known[COORDINATOR].age == 10**6
         again.close()
 
     asyncio.run(main())

@@ -216,3 +216,75 @@ def test_driver_that_tells_of_a_queued_command_that_it_is_taken_does_not_pass(
     monkeypatch.setattr(Bench, "begin", boasting)
     with pytest.raises(AssertionError):
         test(Held())
+
+
+LASTING = parse_net("""
+firable: 1
+cell: lasting
+controllers:
+  a: {start: free, places: {free: , busy: {send: {machine: A, command: WORK}, until: done}, gone: }}
+transitions:
+  begin: {from: a.free, to: a.busy}
+  end: {from: a.busy, to: a.gone}
+""")
+
+
+@pytest.mark.parametrize("was_taken", [True, False])
+def test_a_command_that_its_machine_had_taken_is_not_given_again_because_it_knows_nothing_of_it(
+    was_taken: bool,
+) -> None:
+    """It was switched off and on: it may have done the command by halves, and only somebody who looks can tell."""
+
+    class Forgetting(DryRunDriver):
+        def __init__(self, *, takes: bool) -> None:
+            super().__init__(split(LASTING).subnets, 1.0)
+            self.takes = takes
+            self.sent: list[str] = []
+
+        def send(self, place: Place, entry: int) -> None:
+            self.sent.append(place.name)
+            assert self.listener is not None
+            if self.takes:
+                self.listener.taken(place.name, entry)
+
+        async def ask(self, place: Place, entry: int) -> Answer:
+            assert (place.name, entry) == ("a.busy", 1)
+            return Answer.NOT_RECEIVED
+
+    async def main() -> None:
+        journal, told = MemoryJournal(), list[str]()
+
+        def host(driver: Forgetting) -> Host:
+            recorder = Recorder(LASTING, net_digest(LASTING), io.StringIO(), journal.kept(TRACE).get(KEY))
+            return Host(
+                split(LASTING),
+                driver,
+                recorder,
+                journal=journal,
+                operator=present,
+                resume=True,
+                tell=lambda _, sentence: told.append(sentence),
+            )
+
+        run = host(Forgetting(takes=was_taken))
+        ending = asyncio.create_task(run.main())
+        await asyncio.sleep(5)
+        assert marking(run) == ("a.busy",)
+        run.stop()
+        await ending
+        driver = Forgetting(takes=True)
+        again = host(driver)
+        ending = asyncio.create_task(again.main())
+        await asyncio.sleep(5)
+        if was_taken:
+            assert driver.sent == []
+            assert again.situation().state is State.HELD
+            assert "the machine of 'a.busy' had taken its command, and knows nothing of it any more" in told
+            assert again.say("a.busy", Answer.NOT_RECEIVED)
+            assert again.resume()
+            await asyncio.sleep(1)
+        assert driver.sent == ["a.busy"]
+        again.stop()
+        await ending
+
+    run_in_virtual_time(main())

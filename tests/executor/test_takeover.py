@@ -22,7 +22,9 @@ from firable.executor.journal.memory import HOSTS, remembered
 from firable.executor.journal.sqlite_journal import SqliteJournal, machines_of
 from firable.executor.journal.takeover import take_over
 from firable.executor.links.link import COORDINATOR
-from firable.executor.links.storages import Memory, Met
+from firable.executor.links.storages import Memory, Met, Storage
+from firable.executor.operating.acquaintances import Acquaintances
+from firable.executor.operating.dispatch import TAKEN
 from firable.executor.operating.host import Host
 from firable.executor.operating.taken_up import opened
 from firable.executor.protocol.controller import LocalController
@@ -397,7 +399,7 @@ def test_a_cell_on_several_hosts_is_taken_over_together_and_its_hosts_know_each_
     for name, machines in HOSTS_OF_OLD.items():
         with closing(SqliteJournal(tmp_path / f"{name}.new", read.digest, machines)) as opened:
             kept |= {machine: opened.kept(machine) for machine in machines}
-            memories[name] = remembered(opened.kept(HOSTS))
+            memories[name] = remembered(opened.kept(HOSTS), opened.age)
     assert joint_marking(read.decomposition, kept) == {"robot.worked_out", "table.full"}
     storages = {
         machine: Met(memories[name].storage.name) for name, machines in HOSTS_OF_OLD.items() for machine in machines
@@ -405,6 +407,61 @@ def test_a_cell_on_several_hosts_is_taken_over_together_and_its_hosts_know_each_
     assert len(set(storages.values())) == len(HOSTS_OF_OLD)
     for name, machines in HOSTS_OF_OLD.items():
         assert memories[name].known == {of: storage for of, storage in storages.items() if of not in machines}
+
+
+def test_of_several_hosts_one_with_an_older_copy_of_its_journal_is_not_taken_over(
+    bundles: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options, digest = hosts(bundles, tmp_path), read_bundle(bundles[0]).digest
+
+    def remembers(name: str, age: int) -> None:
+        """The journal of the line was let in by the robot's, which has heard of it at this age since."""
+        with closing(SqliteJournal(tmp_path / "system.old", digest, HOSTS_OF_OLD["system"])) as of_line:
+            line = Acquaintances(of_line, is_linked=True)
+            line.met("robot", Storage(name))
+            line.write()
+            sync_now(of_line)
+            with closing(SqliteJournal(tmp_path / "robot.old", digest, HOSTS_OF_OLD["robot"])) as of_robot:
+                robot = Acquaintances(of_robot, is_linked=True)
+                robot.met("line", line.storage)
+                robot.heard("line", of_line.age + age)
+                robot.write()
+                sync_now(of_robot)
+                name = robot.storage.name
+            line.known["robot"] = Met(name)
+            line.write()
+            sync_now(of_line)
+
+    remembers("", 7)
+    assert main(["takeover", *map(str, bundles), *options]) == 2
+    told = capsys.readouterr().err
+    older = f"{tmp_path}/system.old: the journal is an older copy: it does not hold what {tmp_path}/robot.old knows of"
+    assert f"error[F5050]: {older} 'line'" in told
+    assert not list(tmp_path.glob("*.new*"))
+    remembers("", 1)
+    assert main(["takeover", *map(str, bundles), *options]) == 0
+
+
+def test_a_takeover_of_several_hosts_that_fails_leaves_none_of_its_journals(
+    bundles: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = hosts(bundles, tmp_path)
+    last = options[-1]
+    options[-1] = str(tmp_path / "no folder" / "table.new")
+    assert main(["takeover", *map(str, bundles), *options]) == 2
+    assert "error[F1017]: " in capsys.readouterr().err
+    assert not list(tmp_path.glob("*.new*"))
+    assert main(["takeover", *map(str, bundles), *options[:-1], last]) == 0
+
+
+def test_what_a_machine_has_taken_is_taken_over(bundles: tuple[Path, Path], tmp_path: Path) -> None:
+    options = hosts(bundles, tmp_path)
+    with closing(SqliteJournal(tmp_path / "robot.old", read_bundle(bundles[0]).digest, ("robot",))) as of_robot:
+        of_robot.write(TAKEN, [Keep("robot.working", 3)])
+        sync_now(of_robot)
+    assert main(["takeover", *map(str, bundles), *options]) == 0
+    with closing(SqliteJournal(tmp_path / "robot.new", read_bundle(bundles[1]).digest, ("robot",))) as of_robot:
+        assert of_robot.kept(TAKEN) == {"robot.working": 3}
 
 
 def test_a_marking_is_taken_over_whole_from_one_journal_for_each_machine(
