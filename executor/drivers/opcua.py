@@ -163,8 +163,11 @@ class OpcUaConnection(Stepwise):
         nodes = [self.client.get_node(point) for point, _ in writes]
         for (point, _), node in zip(writes, nodes, strict=True):
             if point not in self.types:
-                with self.step(f"'{point}'", withheld):
-                    self.types[point] = await node.read_data_type_as_variant_type()
+                try:
+                    with self.step(f"'{point}'", withheld):
+                        self.types[point] = await node.read_data_type_as_variant_type()
+                except UaError as error:
+                    raise LinkError(f"the server does not let '{point}' be written: {error}") from None
         try:
             values = [
                 ua.DataValue(ua.Variant(_typed(value, self.types[point]), self.types[point])) for point, value in writes

@@ -279,15 +279,18 @@ def tls_context(certificate: str, key: str, client_authority: str | None) -> ssl
     try:
         context.load_cert_chain(certificate, key)
         fault = fault_of(certificate, key, is_server=True)
-        if fault is None and client_authority is not None:
+    except (OSError, ValueError) as error:
+        fault = unloaded(error, certificate, key)
+        hint = "name PEM files of a certificate and its key"
+    if fault is None and client_authority is not None:
+        whose = f"the authority of the operators in {printable(client_authority)}"
+        hint = "name the certificate that has signed those of the operators, and look at the clock of this host"
+        try:
             context.load_verify_locations(client_authority)
             context.verify_mode = ssl.CERT_REQUIRED
-            if fault := fault_of_authority(client_authority, time.time()):
-                whose = f"the authority of the operators in {printable(client_authority)}"
-                hint = "name the certificate that has signed those of the operators, and look at the clock of this host"
-    except (OSError, ValueError) as error:
-        fault = unloaded(error, certificate, key, *([] if client_authority is None else [client_authority]))
-        hint = "name PEM files of a certificate and its key"
+            fault = fault_of_authority(client_authority, time.time())
+        except (OSError, ValueError) as error:
+            fault = unloaded(error, client_authority)
     if fault is not None:
         message = f"{whose} cannot be used: {fault}"
         raise InputError([Diagnostic("F5062", message, hint)])

@@ -87,7 +87,10 @@ def _unready(run: Host, one: Blocked) -> Blocked:
 def ended(run: Host) -> Situation | None:
     """How the run has ended; None where it goes on."""
     if not run.is_whole:
-        return _reached(run) if run.stopping and (run.has_waited or _nobody_waits(run)) else None
+        if not run.stopping or not (run.has_waited or _nobody_waits(run)):
+            return None
+        found, held = _reached(run), "" if run.taking_up is None else restart.told(run, run.taking_up)
+        return replace(found, message="; ".join(filter(None, (found.message, held))))
     if run.stopping:
         return _reached(run)
     if run.taking_up is not None:

@@ -316,6 +316,22 @@ def test_an_authority_by_which_nobody_is_believed_is_refused_before_anybody_come
     tls_context(own.certificate, own.key, str(both))
 
 
+@pytest.mark.parametrize("what", ["missing", "empty", "garbage", "folder"])
+def test_a_file_that_is_no_authority_is_named_and_not_the_certificate_of_the_endpoint(
+    what: str, tmp_path: Path
+) -> None:
+    own, authority = Site(tmp_path / "site").host("run"), tmp_path / "ca.pem"
+    if what == "folder":
+        authority.mkdir()
+    elif what != "missing":
+        authority.write_text("" if what == "empty" else "garbage")
+    with pytest.raises(InputError) as caught:
+        tls_context(own.certificate, own.key, str(authority))
+    (problem,) = caught.value.diagnostics
+    assert problem.code == "F5062"
+    assert problem.message.startswith(f"the authority of the operators in {authority} cannot be used: ")
+
+
 def test_an_answer_that_takes_for_ever_does_not_keep_the_process_when_the_run_is_over() -> None:
     class Stepping(Told):
         async def step(self) -> str | None:

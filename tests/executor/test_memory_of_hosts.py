@@ -245,6 +245,20 @@ def test_an_older_copy_stays_one_however_often_it_was_started_where_nobody_is(tm
     run_in_virtual_time(main())
 
 
+def test_a_host_that_is_stopped_while_it_is_held_says_so_at_its_end(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        await asyncio.sleep(2.5)
+        await cell.kill(ROBOT)
+        cell.start(ROBOT)
+        await asyncio.sleep(5)
+        for machines, ended in (await cell.stop()).items():
+            assert ended.state is State.STOPPED
+            assert ("nothing moves until it is resumed" in ended.message) == (machines == ROBOT)
+
+    run_in_virtual_time(main())
+
+
 def test_what_was_heard_last_outlives_an_end_in_order(tmp_path: Path) -> None:
     async def main() -> None:
         hosts = Hosts()
