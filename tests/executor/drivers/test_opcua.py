@@ -9,8 +9,10 @@ import pytest
 
 from firable.executor.drivers.bench import Far
 from firable.executor.drivers.conformance import DriverConformance
+from firable.executor.drivers.device import LinkError, Wanted
 from firable.executor.drivers.far_side.machine import ROLES
 from firable.executor.drivers.far_side.opcua_server import OpcUaEnd
+from firable.executor.drivers.opcua import KIND, OpcUaOptions
 
 POINTS = {role: f"ns=2;s=M.{role}" for role in (*ROLES, "number")}
 BITS = {"sensor", "closed", "button", "tripped", "output"}
@@ -40,3 +42,18 @@ class TestOpcUa(DriverConformance):
             await self.end.start(lambda _point, _value: None)
             await self.end.stop()
         yield Far(self.end, f"driver: opcua, url: 'opc.tcp://127.0.0.1:{self.end.port}/', every_s: 0.005", POINTS)
+
+    def test_a_node_that_the_server_has_not_is_named_when_it_is_to_be_written(self) -> None:
+        async def main() -> None:
+            if not self.end.port:
+                await self.end.start(lambda _point, _value: None)
+            else:
+                await self.end.mend()
+            options = OpcUaOptions(url=f"opc.tcp://127.0.0.1:{self.end.port}/")
+            connection = await KIND.connect(options, Wanted((POINTS["sensor"],), 10.0))
+            with pytest.raises(LinkError, match=r"not let .ns=2;s=M\.numbr. be written: .*BadNodeIdUnknown"):
+                await connection.write((("ns=2;s=M.numbr", 1),))
+            await connection.close()
+            await self.end.stop()
+
+        self.run(main())
