@@ -94,8 +94,8 @@ class BoundDriver:
 
     @property
     def unreached(self) -> tuple[str, ...]:
-        """The devices to which there is no connection now, in a phrase each that says why."""
-        return tuple(device.unreached for device in self.devices.values() if device.unreached)
+        """The devices to which there is no connection now, or that have never shown a signal, in a phrase each."""
+        return tuple(phrase for device in self.devices.values() if (phrase := device.unreached or device.unshown))
 
     def readings(self) -> Mapping[str, Reading]:
         """The process image."""

@@ -69,6 +69,10 @@ class BoundDevice:
         self.ready_seconds = 0.0
         """When there was a connection first, by the event loop."""
         self.alarm: asyncio.TimerHandle | None = None
+        self.due: asyncio.TimerHandle | None = None
+        """When all signals should have been shown."""
+        self.is_overdue = False
+        """Whether they should have been by now."""
         self.noted = ""
         self.garbage: dict[Point, Value] = {}
         points = {*self.image.reads, *self.image.counters, *self.replies}
@@ -84,7 +88,7 @@ class BoundDevice:
         try:
             await self.kept.run()
         finally:
-            for alarm in (self.alarm, begun):
+            for alarm in (self.alarm, self.due, begun):
                 if alarm is not None:
                     alarm.cancel()
 
@@ -134,6 +138,15 @@ class BoundDevice:
             return ""
         return ": ".join(filter(None, (f"{self.name} is not connected", self.noted)))
 
+    @property
+    def unshown(self) -> str:
+        """What it should have shown by now and never has, with the points; empty where there is nothing."""
+        unread = [name for name, reading in self.image.readings.items() if reading.why == Reading().why]
+        if not self.is_overdue or not unread:
+            return ""
+        where = ", ".join(f"'{name}' (at {self.image.signals[name].read})" for name in sorted(unread))
+        return f"{self.name} has never shown {where}"
+
     def against(self) -> Iterator[str]:
         """What keeps its driver latched, in a phrase each."""
         if not self.is_ready.is_set():
@@ -179,9 +192,17 @@ class BoundDevice:
             if (forgotten := channel.connected_again()) is not None:
                 self._fault(f"knows nothing any more of '{forgotten.text}' of '{forgotten.place}', which it had taken")
         if not self.was_ready:
-            self.ready_seconds = asyncio.get_running_loop().time()
+            loop = asyncio.get_running_loop()
+            self.ready_seconds = loop.time()
+            self.due = loop.call_later(self.document.start_s, self._should_have_shown)
         self.was_ready = True
         self.is_ready.set()
+
+    def _should_have_shown(self) -> None:
+        """Tell what was never shown: where a device tells unasked, a point that is written wrong is not noticed."""
+        self.is_overdue = True
+        if self.unshown:
+            self.note(f"{self.unshown.removeprefix(self.name + ' ')}: are the points written as the device has them?")
 
     def lost(self, why: str) -> None:
         """There is no connection, or none any more."""

@@ -121,7 +121,7 @@ class Driver(Protocol):
 
     @property
     def unreached(self) -> Collection[str]:
-        """The devices to which there is no connection now, in a phrase each that says why."""
+        """The devices to which there is no connection now, or that have never shown a signal, in a phrase each."""
         ...
 
     def readings(self) -> Mapping[str, Reading]:

@@ -77,3 +77,39 @@ def test_coalesced_edges_and_lost_signals_of_every_device_are_among_the_figures(
     assert 'firable_input_good{signal="a.other"} 0.0' in text
     assert 'firable_input_good{signal="emergency stop door"} 1.0' in text
     assert message == "emergency stop: near: 'door' is open"
+
+
+def test_a_signal_that_its_device_never_shows_is_told_with_its_point(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A topic that was mistyped is no error to a broker: nothing ever comes."""
+    theirs = EntryPoint("theirs", "support.third_party_driver:KIND", kinds.GROUP)
+    monkeypatch.setattr(kinds, "entry_points", lambda **_: [theirs])
+    binding = BINDING.replace("read: key", "read: ky").replace("memory: near", "memory: near, start_s: 0.05")
+
+    async def main() -> None:
+        near, far = MemoryEnd("near"), MemoryEnd("far")
+        for end, points in ((near, ("key", "door")), (far, ("other",))):
+            await end.start(lambda _point, _value: None)
+            for point in points:
+                end.show(point, value=True)
+        told: list[str] = []
+        driver = bound_driver(parse_binding(binding), NET)
+        host = Host(
+            split(NET),
+            driver,
+            Recorder(NET, net_digest(NET), None),
+            operator=lambda _: asyncio.sleep(60),
+            tell=lambda _, sentence: told.append(sentence),
+        )
+        ending = asyncio.create_task(host.main())
+        sentence = "near: has never shown 'a.key' (at ky): are the points written as the device has them?"
+        await until(lambda: sentence in told, "the sentence")
+        assert driver.unreached == ("near has never shown 'a.key' (at ky)",)
+        assert "near has never shown 'a.key' (at ky)" in host.situation().message
+        await asyncio.sleep(0.2)
+        assert not [one for one in told if one.startswith("far: has never")]
+        near.show("ky", value=True)
+        await until(lambda: not driver.unreached, "the signal is shown")
+        host.stop()
+        assert "never shown" not in (await ending).message
+
+    asyncio.run(main())
