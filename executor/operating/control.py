@@ -92,6 +92,10 @@ class Operated(Protocol):
         """Keep in the trace who commanded what."""
         ...
 
+    def not_obeyed(self, command: str, by: str, why: str) -> None:
+        """Keep in the trace which of these was refused, and why."""
+        ...
+
     def turned_away(self, command: str, by: str) -> None:
         """Keep in the trace who has asked for what and was not let in."""
         ...
@@ -220,17 +224,23 @@ def application(
 
         return handler
 
+    def answered(request: web.Request, command: str, refused: Collection[str], **more: object) -> web.Response:
+        """The answer to a command that may have been refused, which stands in the trace, too."""
+        if refused:
+            run.not_obeyed(command, who(request), "; ".join(refused))
+        return web.json_response({**more, "refused": list(refused), **_situation(run)})
+
     async def resume(request: web.Request) -> web.Response:
         run.commanded("resume", who(request))
         refused = [] if run.resume() else [f"the run is {run.situation().state}, and cannot be resumed now"]
-        return web.json_response({"refused": refused, **_situation(run)})
+        return answered(request, "resume", refused)
 
     async def step(request: web.Request) -> web.Response:
         run.commanded("step", who(request))
         fired = await run.step()
         now = run.situation().state
         refused = [] if fired or now is State.PAUSED else [f"the run is {now}, and only one that is paused is stepped"]
-        return web.json_response({"fired": fired, "refused": refused, **_situation(run)})
+        return answered(request, "step", refused, fired=fired)
 
     async def emergency_stop(request: web.Request) -> web.Response:
         by = who(request)
@@ -240,14 +250,15 @@ def application(
 
     async def reset(request: web.Request) -> web.Response:
         run.commanded("reset", who(request))
-        return web.json_response({"refused": list(run.reset()), **_situation(run)})
+        return answered(request, "reset", run.reset())
 
     async def say(request: web.Request) -> web.Response:
         place, word = request.query.get("place", ""), request.query.get("answer", "")
-        run.commanded(f"say {place}={word}", who(request))
+        command = f"say {place}={word}"
+        run.commanded(command, who(request))
         is_asked = word in _SAID and run.say(place, Answer(word))
         refused = [] if is_asked else [f"nobody asks after {place}" if word in _SAID else f"say {', '.join(_SAID)}"]
-        return web.json_response({"refused": refused, **_situation(run)})
+        return answered(request, command, refused)
 
     who_may = admission(endpoint, () if page is None else page.public, run.turned_away)
     app = web.Application(middlewares=[who_may], client_max_size=1024)

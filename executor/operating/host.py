@@ -40,7 +40,7 @@ from firable.executor.operating.groups import Groups
 from firable.executor.operating.items import SignalRead
 from firable.executor.operating.latch import Latch
 from firable.executor.operating.local_monitor import LocalMonitor
-from firable.executor.operating.log import TURNED_AWAY, Log
+from firable.executor.operating.log import NOT_OBEYED, TURNED_AWAY, Log
 from firable.executor.operating.monitor import Divergence, Monitor
 from firable.executor.operating.peers import Peers
 from firable.executor.operating.recorder import TRACE, Recorder
@@ -264,6 +264,10 @@ class Host:
     def commanded(self, command: str, by: str) -> None:
         """Who commanded what stands in the trace."""
         self.note("commanded", what=command, by=by)
+
+    def not_obeyed(self, command: str, by: str, why: str) -> None:
+        """And which of these was refused."""
+        self.note(NOT_OBEYED, what=command, by=by, why=why)
 
     def turned_away(self, command: str, by: str) -> None:
         """Who was not let in stands there, too."""

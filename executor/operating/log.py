@@ -32,13 +32,16 @@ FROZEN: Final = "frozen"
 TURNED_AWAY: Final = "not let in"
 """The kind of note of somebody who would act on the run, and has shown that they may not."""
 
+NOT_OBEYED: Final = "not obeyed"
+"""The kind of note of a command of an operator that was refused."""
+
 LEVELS: Final[Mapping[str, int]] = MappingProxyType(
     {
         **dict.fromkeys(("fault", "divergence", "emergency stop", "latched", HANGS), logging.ERROR),
         **dict.fromkeys(
             ("lost", "refused", "never-met", "dropped", "held", "unasked", "withdrawn", "untold"), logging.WARNING
         ),
-        **dict.fromkeys((FROZEN, TURNED_AWAY, UNWATCHED), logging.WARNING),
+        **dict.fromkeys((FROZEN, TURNED_AWAY, NOT_OBEYED, UNWATCHED), logging.WARNING),
     }
 )
 """The level of each kind of note; of all others it is `info`."""

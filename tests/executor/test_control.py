@@ -68,6 +68,9 @@ class Told:
     def commanded(self, command: str, by: str) -> None:
         self.log.append(f"{by}: {command}")
 
+    def not_obeyed(self, command: str, by: str, why: str) -> None:
+        self.log.append(f"{by}: {command} refused: {why}")
+
     def turned_away(self, command: str, by: str) -> None:
         self.log.append(f"{by}: {command} not let in")
 
@@ -122,7 +125,14 @@ def test_a_resume_or_a_step_that_does_nothing_is_refused_in_the_words_of_the_sit
                 told = await answer.json()
                 assert told["fired"] is None
                 assert told["refused"] == ["the run is waiting, and only one that is paused is stepped"]
-        assert run.log == ["token: resume", "resume", "token: step", "step"]
+        assert run.log == [
+            "token: resume",
+            "resume",
+            "token: resume refused: the run is waiting, and cannot be resumed now",
+            "token: step",
+            "step",
+            "token: step refused: the run is waiting, and only one that is paused is stepped",
+        ]
 
     asyncio.run(main())
 
@@ -145,6 +155,11 @@ def test_a_reset_and_what_is_said_of_a_command_are_answered_by_what_is_against_t
         "say robot.free DONE",
     ]
     assert log[0] == "token: reset"
+    assert [line for line in log if "refused" in line] == [
+        "token: reset refused: D: 'button' is not closed",
+        "token: say robot.free=done refused: nobody asks after robot.free",
+        "token: say robot.grasp=unknown refused: say done, working, not received",
+    ]
 
 
 @pytest.mark.parametrize("headers", [{}, {"Authorization": "Bearer wrong"}, {"Authorization": f"Basic {TOKEN}"}])
