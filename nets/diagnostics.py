@@ -131,7 +131,7 @@ CODES: Final[dict[str, str]] = {
     "F5007": "a run that did not come to its end",
     "F5008": "machines that did what their plant file does not allow",
     "F5020": "a host that may not take part",
-    "F5021": "a link that cannot be opened",
+    "F5021": "a link that cannot be opened, or has failed",
     "F5022": "a link that is open to the network",
     "F5023": "a bundle without the signature that is demanded",
     "F5024": "a key or signatures that are none, or damaged",

@@ -86,8 +86,8 @@ def dealt_out(
     one. Raises `InputError` F5050 where a machine of the old cell is in no journal or in two, or a controller of the
     new one has no host.
     """
-    problems, names = [], tuple(new)
-    for name in old:
+    problems, before, names = [], tuple(old), tuple(new)
+    for name in before:
         holding = [journal for journal, machines in journals.items() if name in machines]
         if not holding:
             hint = "name the journals of all hosts: a marking is taken over whole"
@@ -100,7 +100,7 @@ def dealt_out(
         return dict.fromkeys(journals, names)
     of = {name: journal for journal, machines in journals.items() for name in machines}
     for name in names:
-        if name not in of:
+        if name not in of and name not in before:
             hint = "keep the controllers while the cell runs on several hosts; others can be added while it is empty"
             problems.append(_against(f"no host runs {called(name)}, which only the new net has", hint))
     if problems:

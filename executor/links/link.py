@@ -152,6 +152,12 @@ def _with_its_journal(host: str, why: Estranged) -> str:
     )
 
 
+def has_failed(what: str, reason: str) -> InputError:
+    """The end of a link that was open (F5021)."""
+    hint = "mend it, and start this host again: with its journal it goes on where it was"
+    return InputError([Diagnostic("F5021", f"the link {printable(what)} has failed: {printable(reason)}", hint)])
+
+
 def cannot_open(what: str, reason: str) -> InputError:
     """The refusal of a link that does not come up (F5021)."""
     message = f"the link {printable(what)} cannot be opened: {printable(reason)}"

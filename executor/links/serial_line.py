@@ -31,7 +31,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from firable.executor.links.encoding import EncodingError, pack, unpack
 from firable.executor.links.framing import PAYLOAD_BYTES_MAX, Frame, FrameReader, Kind, pack_frame
-from firable.executor.links.link import Greeting, LinkListener, cannot_open, come_back_without, objection
+from firable.executor.links.link import Greeting, LinkListener, cannot_open, come_back_without, has_failed, objection
 from firable.executor.links.storages import Memory, Met, Storage
 from firable.executor.protocol.messages import Message
 from firable.nets.interchange import canonical_json
@@ -156,7 +156,7 @@ class SerialLink:
             return
         line = _line(sender, receiver, pack(self._tell().age, message))
         if len(line) > PAYLOAD_BYTES_MAX:
-            self._break(cannot_open(self.port, f"a message of {len(line):,} bytes is longer than a frame"))
+            self._break(has_failed(self.port, f"a message of {len(line):,} bytes is longer than a frame"))
         peer.queue.append(line)
         self.awake.set()
 
@@ -340,7 +340,7 @@ class SerialLink:
         try:
             act()
         except OSError as error:
-            self._break(cannot_open(self.port, _reason(error)))
+            self._break(has_failed(self.port, _reason(error)))
         except Exception as error:
             self._break(error)
 

@@ -45,6 +45,8 @@ async def reset(host: Host) -> None:
     """Reset it as soon as nothing is against it, and say what became of what no machine can tell."""
     await until(lambda: host.latch is not None and not host.latch.driver.against(), "that nothing is against it")
     assert host.reset() == ()
+    if host.taking_up is not None and not host.taking_up.is_final:  # the machines are asked before anybody
+        assert "look at the machine" not in host.situation().message
     await until(lambda: host.taking_up is not None and host.taking_up.is_final, "the answers of the machines")
     for place in uncertain(host):
         assert host.say(place, Answer.NOT_RECEIVED)
