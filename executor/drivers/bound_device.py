@@ -141,7 +141,7 @@ class BoundDevice:
     @property
     def unshown(self) -> str:
         """What it should have shown by now and never has, with the points; empty where there is nothing."""
-        unread = [name for name, reading in self.image.readings.items() if reading.why == Reading().why]
+        unread = [name for name, reading in self.image.readings.items() if not reading.at_seconds]
         if not self.is_overdue or not unread:
             return ""
         where = ", ".join(f"'{name}' (at {self.image.signals[name].read})" for name in sorted(unread))

@@ -5,10 +5,10 @@ other, with the messages for it; the addressed station answers with one frame, w
 unasked, so nothing collides. That is also the bus of the paper, and it fits the protocol: controllers talk with their
 coordinator alone. A lost frame loses its messages, and the next poll goes on.
 
-The master's first poll of a station is a greeting, and so is the answer. A station that was started anew answers any
-poll by its greeting, which is how the master notices. A station that has not answered for the lease is lost, and asked
-less often, so that a dead one does not slow the line down; one that has not been asked for the lease has lost its
-master.
+A station that is not connected answers any poll by its greeting, which is how the master notices that one is there, or
+was started anew; then the master greets it. So an address where nobody is costs a short frame, and no greeting. A
+station that has not answered for the lease is lost, and asked less often, so that a dead one does not slow the line
+down; one that has not been asked for the lease has lost its master.
 
 The address of a host follows from the bundle, which all have: 0 for the master, and for a station the number of its
 first controller in the net, from 1. Rejected: a token that goes round, or collisions as on Ethernet: both need what a
@@ -81,6 +81,8 @@ class _Peer:
     queue: deque[bytes] = field(default_factory=lambda: deque(maxlen=QUEUE_MAX))
     """Messages for it, each the line of a frame. Of too many the oldest are lost."""
     asked_at_cycle: int = 0
+    is_there: bool = False
+    """Of a station: whether it has answered the last poll."""
 
 
 class SerialLink:
@@ -176,14 +178,17 @@ class SerialLink:
                 peer.asked_at_cycle = cycle
                 number = (number + 1) % 256
                 busy |= bool(peer.queue)
+                greets = peer.is_there and not peer.names
                 answered = self.answered = loop.create_future()
                 self.asked = (address, number)
-                poll = self._frame(address, peer, number)
+                poll = self._frame(address, peer, number, greet=greets)
                 self._write(poll)
                 answer = await self._answer(answered, len(poll))
+                was_there, peer.is_there = peer.is_there, answer is not None
                 if answer is not None:
-                    busy |= bool(answer.payload) and answer.kind is Kind.MESSAGES
-                    self._heard(peer, answer)
+                    busy |= (bool(answer.payload) and answer.kind is Kind.MESSAGES) or not was_there
+                    if peer.names or greets:
+                        self._heard(peer, answer)
                 elif peer.names and loop.time() - peer.heard_seconds > self.lease_seconds:
                     self._lose(peer)
             if not busy:
@@ -231,7 +236,7 @@ class SerialLink:
 
     def _frame(self, to: int, peer: _Peer, number: int, *, greet: bool = False) -> bytes:
         """A frame for a host: the greeting as long as it is not connected, then as many messages as go into one."""
-        if greet or not peer.names:
+        if greet or (self.own != MASTER and not peer.names):
             memory = self._tell().memory
             known = {name: str(met) for name, met in memory.known.items() if self.addresses.get(name) == to}
             said = _Said(self.greeting, self.instance, str(memory.storage), known)

@@ -43,6 +43,8 @@ class Dispatch:
         self.overdue_seconds = overdue_seconds
         self.timers: dict[str, asyncio.TimerHandle] = {}
         """The alarm of each command that is awaited, by its completion or, without one, its place."""
+        self.is_taken_kept = True
+        """Whether what was taken is stored: what a machine says while it is stopped is behind the last group."""
         self.untaken: set[str] = set()
         """The places whose command has no completion, and is with the driver."""
         self.left_behind = _left_behind(run.net)
@@ -64,12 +66,20 @@ class Dispatch:
         """A machine has the command of a place; a token without completion has waited for that."""
         sender = self.run.net.place(place)
         if sender.completion is not None:
-            self.run.journal.write(TAKEN, [Keep(place, entry)])
-            self.run.acts.have_kept()
+            self.keep_taken(place, entry)
         else:
             self.untaken.discard(place)
             self.over(place)
             self.run.acts.hear(str(sender.owner), CommandTaken(place, entry))
+
+    def keep_taken(self, place: str, entry: int | None) -> None:
+        """Have the journal keep that a machine has this command of a place, or by None that it has none."""
+        self.run.journal.write(TAKEN, [Keep(place, entry)])
+        self.is_taken_kept = False
+        self.run.acts.have_kept(self._taken_kept)
+
+    def _taken_kept(self) -> None:
+        self.is_taken_kept = True
 
     def left(self, controller: str, transition: str) -> None:
         """Give up what the tokens of a controller have left behind."""

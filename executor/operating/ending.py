@@ -89,8 +89,10 @@ def ended(run: Host) -> Situation | None:
     if not run.is_whole:
         if not run.stopping or not (run.has_waited or _nobody_waits(run)):
             return None
-        found, held = _reached(run), "" if run.taking_up is None else restart.told(run, run.taking_up)
-        return replace(found, message="; ".join(filter(None, (found.message, held))))
+        found = _reached(run)
+        if run.taking_up is None or found.is_emergency:
+            return found
+        return replace(found, message="; ".join(filter(None, (found.message, restart.told(run, run.taking_up)))))
     if run.stopping:
         return _reached(run)
     if run.taking_up is not None:

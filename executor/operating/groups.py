@@ -121,11 +121,13 @@ class Groups:
             self.run.broken(InputError([Diagnostic(code, message, hint)]))
 
     async def write_last(self, patience: Patience) -> str:
-        """Write the lines of the trace that are left and, of a host among others, what was heard of them last.
+        """Write the lines of the trace that are left and, what was taken or, of other hosts, heard since the last sync.
 
         Returns a sentence where that had to be given up. Raises `InputError` F1017 or F5034 where it fails.
         """
-        sync = self.run.journal.sync() if self.run.link is not None and self.storing is None else None
+        self.run.recorder.may_write |= self.run.acquaintances.is_alive
+        has_news = self.run.link is not None or not self.run.dispatch.is_taken_kept
+        sync = self.run.journal.sync() if has_news and self.storing is None else None
         if last := [one for one in (sync, self.run.recorder.writing()) if one is not None]:
             storing = asyncio.get_running_loop().run_in_executor(None, _store, last)
             if await uncut([storing], patience):

@@ -96,6 +96,8 @@ class Host:
         self.machines = everything if machines is None else machines
         self.link = link
         self.acquaintances = Acquaintances(self.journal, is_linked=link is not None)
+        # One that may be refused changes no file, until somebody has let it in or, after a restart, it is resumed.
+        recorder.may_write = link is None
         self.is_whole = link is None
         self.speed = speed
         self.begin_seconds = begin_seconds
@@ -147,8 +149,7 @@ class Host:
         at_once, go_on = self.groups.at_once, self._go_on
         known, link = self.acquaintances, self.link
         self.peers = Peers(self.decomposition, self.acts, known, link, self.told, at_once, go_on, self.broken)
-        # Before anybody has let this host in, it may be refused, and changes no file.
-        self.recorder.may_write = known.is_alive or link is None or not self.peers.names
+        self.recorder.may_write |= not self.peers.names
         if self.peers.is_unmet:
             self.acts.halt()
         self.owner_of = {signal.name: name for name, c in self.controllers.items() for signal in c.subnet.signals}
@@ -276,6 +277,8 @@ class Host:
     def answer(self, controller: str, place: str, entry: int, answer: Answer) -> None:
         """Say what became of a command that was under way when the host was restarted."""
         self.acts.act(controller, self.controllers[controller].answer(place, entry, answer))
+        if answer in (Answer.WORKING, Answer.NOT_RECEIVED):
+            self.dispatch.keep_taken(place, entry if answer is Answer.WORKING else None)
         if answer is Answer.WORKING:
             self.dispatch.watch(place)
 

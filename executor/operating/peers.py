@@ -217,7 +217,8 @@ class Peers:
     def _speak(self) -> None:
         """This life is kept: what was not said because it was not is said now."""
         if not self.acquaintances.is_alive:
-            self.acquaintances.is_alive = self.acts.recorder.may_write = True
+            self.acquaintances.is_alive = True
+            self.acts.recorder.may_write |= not any(each.held for each in self.acts.controllers.values())
             self._say_again()
 
     def _say_again(self) -> None:

@@ -55,7 +55,8 @@ async def take_up(run: Host, found: TakingUp) -> None:
     for name, controller in run.controllers.items():
         for place, entry in controller.commands.questions:
             answer = Answer((await run.driver.ask(run.net.place(place), entry)).value)
-            if answer is Answer.NOT_RECEIVED and was_taken(run.journal, place, entry):
+            is_marked = bool(controller.word & 1 << controller.subnet.place_index[place])  # else it is void
+            if answer is Answer.NOT_RECEIVED and is_marked and was_taken(run.journal, place, entry):
                 answer = Answer.UNKNOWN
                 run.told("held", f"the machine of '{place}' had taken its command, and knows nothing of it any more")
             if answer is Answer.UNKNOWN:
@@ -108,6 +109,7 @@ def say(run: Host, place: str, answer: Answer) -> bool:
 def release(run: Host) -> None:
     """End the hold: what is owed is sent, and what is enabled fires."""
     run.taking_up = None
+    run.recorder.may_write = True
     run.note("taken up")
     for name, controller in run.controllers.items():
         run.acts.act(name, controller.resume())

@@ -7,6 +7,7 @@ import io
 from collections import deque
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from functools import partial
 from importlib.metadata import EntryPoint
 
 import pytest
@@ -19,19 +20,20 @@ from firable.executor.drivers import kinds
 from firable.executor.drivers.bench import Bench, Far
 from firable.executor.drivers.bound import BoundDriver
 from firable.executor.drivers.conformance import DriverConformance
-from firable.executor.drivers.driver import Answer, withdraw
+from firable.executor.drivers.driver import Answer, Clock, Listener, withdraw
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.drivers.far_side.machine import ROLES
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.links.in_process import Exchange, InProcessLink
 from firable.executor.links.link import COORDINATOR, Greeting
 from firable.executor.links.storages import Memory, Storage
+from firable.executor.operating.dispatch import TAKEN
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import KEY, TRACE, Recorder
 from firable.executor.operating.situation import State
-from firable.executor.protocol.messages import Effect, Firing, Sending
+from firable.executor.protocol.messages import Effect, Firing, Sending, Stored
 from firable.nets.interchange import net_digest
-from firable.nets.net import Place
+from firable.nets.net import Net, Place
 from firable.nets.text import parse_net
 
 NET = parse_net("""\
@@ -227,6 +229,46 @@ transitions:
   begin: {from: a.free, to: a.busy}
   end: {from: a.busy, to: a.gone}
 """)
+IN_TIME = parse_net("""
+firable: 1
+cell: in_time
+controllers:
+  a: {start: free, places: {free: , busy: {send: {machine: A, command: WORK}, until: done, within: {time: 2s, to: late}}, late: , gone: }}
+transitions:
+  begin: {from: a.free, to: a.busy}
+  end: {from: a.busy, to: a.gone}
+""")
+
+
+class Forgetting(DryRunDriver):
+    """A machine that takes its commands, or not, is never done, and knows nothing of them after a restart."""
+
+    def __init__(self, net: Net, *, takes: bool) -> None:
+        super().__init__(split(net).subnets, 1.0)
+        self.takes = takes
+        self.sent: list[str] = []
+        self.last: tuple[str, int] | None = None
+
+    def send(self, place: Place, entry: int) -> None:
+        self.sent.append(place.name)
+        self.last = place.name, entry
+        if self.takes:
+            self.take()
+
+    def take(self) -> None:
+        assert self.listener is not None
+        assert self.last is not None
+        self.listener.taken(*self.last)
+
+    async def ask(self, place: Place, entry: int) -> Answer:
+        assert (place.name, entry) == ("a.busy", 1)
+        return Answer.NOT_RECEIVED
+
+
+def forgetful(net: Net, driver: Forgetting, journal: Journal, told: list[str]) -> Host:
+    recorder = Recorder(net, net_digest(net), io.StringIO(), journal.kept(TRACE).get(KEY))
+    tell = partial(lambda told, _, sentence: told.append(sentence), told)
+    return Host(split(net), driver, recorder, journal=journal, operator=present, resume=True, tell=tell)
 
 
 @pytest.mark.parametrize("was_taken", [True, False])
@@ -235,45 +277,16 @@ def test_a_command_that_its_machine_had_taken_is_not_given_again_because_it_know
 ) -> None:
     """It was switched off and on: it may have done the command by halves, and only somebody who looks can tell."""
 
-    class Forgetting(DryRunDriver):
-        def __init__(self, *, takes: bool) -> None:
-            super().__init__(split(LASTING).subnets, 1.0)
-            self.takes = takes
-            self.sent: list[str] = []
-
-        def send(self, place: Place, entry: int) -> None:
-            self.sent.append(place.name)
-            assert self.listener is not None
-            if self.takes:
-                self.listener.taken(place.name, entry)
-
-        async def ask(self, place: Place, entry: int) -> Answer:
-            assert (place.name, entry) == ("a.busy", 1)
-            return Answer.NOT_RECEIVED
-
     async def main() -> None:
         journal, told = MemoryJournal(), list[str]()
-
-        def host(driver: Forgetting) -> Host:
-            recorder = Recorder(LASTING, net_digest(LASTING), io.StringIO(), journal.kept(TRACE).get(KEY))
-            return Host(
-                split(LASTING),
-                driver,
-                recorder,
-                journal=journal,
-                operator=present,
-                resume=True,
-                tell=lambda _, sentence: told.append(sentence),
-            )
-
-        run = host(Forgetting(takes=was_taken))
+        run = forgetful(LASTING, Forgetting(LASTING, takes=was_taken), journal, told)
         ending = asyncio.create_task(run.main())
         await asyncio.sleep(5)
         assert marking(run) == ("a.busy",)
         run.stop()
         await ending
-        driver = Forgetting(takes=True)
-        again = host(driver)
+        driver = Forgetting(LASTING, takes=False)
+        again = forgetful(LASTING, driver, journal, told)
         ending = asyncio.create_task(again.main())
         await asyncio.sleep(5)
         if was_taken:
@@ -286,5 +299,57 @@ def test_a_command_that_its_machine_had_taken_is_not_given_again_because_it_know
         assert driver.sent == ["a.busy"]
         again.stop()
         await ending
+        third = forgetful(LASTING, driver := Forgetting(LASTING, takes=True), journal, told)
+        ending = asyncio.create_task(third.main())
+        await asyncio.sleep(5)
+        assert driver.sent == ["a.busy"], "nobody has taken it since somebody said that it was not received"
+        third.stop()
+        await ending
+
+    run_in_virtual_time(main())
+
+
+def test_nobody_is_asked_after_a_command_that_was_taken_and_that_its_token_has_left() -> None:
+    async def main() -> None:
+        journal, told = MemoryJournal(), list[str]()
+        run = forgetful(IN_TIME, Forgetting(IN_TIME, takes=True), journal, told)
+        ending = asyncio.create_task(run.main())
+        await asyncio.sleep(5)
+        assert marking(run) == ("a.late",)
+        run.stop()
+        await ending
+        again = forgetful(IN_TIME, Forgetting(IN_TIME, takes=True), journal, told)
+        ending = asyncio.create_task(again.main())
+        await asyncio.sleep(5)
+        assert again.situation().state is not State.HELD
+        assert not [sentence for sentence in told if "had taken" in sentence]
+        again.stop()
+        await ending
+
+    run_in_virtual_time(main())
+
+
+def test_what_a_machine_takes_while_it_is_stopped_is_kept() -> None:
+    class Synced(MemoryJournal):
+        kept_taken: Stored | None = None
+
+        def sync(self) -> None:
+            self.kept_taken = self.kept(TAKEN).get("a.busy")
+
+    class Last(Forgetting):
+        async def run(self, clock: Clock, listener: Listener) -> None:
+            try:
+                await super().run(clock, listener)
+            finally:
+                self.take()
+
+    async def main() -> None:
+        journal = Synced()
+        run = forgetful(LASTING, Last(LASTING, takes=False), journal, [])
+        ending = asyncio.create_task(run.main())
+        await asyncio.sleep(5)
+        run.stop()
+        await ending
+        assert journal.kept_taken == 1
 
     run_in_virtual_time(main())
