@@ -119,6 +119,8 @@ class TraceFile:
 
 TRACE: Final = "\ntrace"
 """The name under which the journal keeps the trace; no machine has it."""
+HELD_BACK_MAX: Final = 1000
+"""So many lines wait at most until they may be written: the journal keeps them with each group until then."""
 KEY: Final = "trace"
 """Under which the journal keeps what a restart needs to go on with a trace."""
 
@@ -257,6 +259,7 @@ class Recorder:
 
         `written` follows when it is done. What is returned raises `InputError` F1017 where the file cannot be written.
         """
+        self.may_write |= len(self.unwritten) > HELD_BACK_MAX
         self.begun = len(self.unwritten) if self.may_write else 0
         if self.begun == 0 or not isinstance(self.stream, TraceFile):
             return None

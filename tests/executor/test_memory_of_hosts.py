@@ -27,7 +27,7 @@ from firable.executor.links.link import COORDINATOR, Greeting
 from firable.executor.links.storages import Memory, Met, Storage
 from firable.executor.operating.acquaintances import Acquaintances
 from firable.executor.operating.host import Host
-from firable.executor.operating.recorder import KEY, TRACE, Recorder
+from firable.executor.operating.recorder import HELD_BACK_MAX, KEY, TRACE, Recorder, TraceFile
 from firable.executor.operating.situation import Situation, State
 from firable.executor.protocol.messages import Hello, Keep
 from firable.nets.diagnostics import Diagnostic, InputError
@@ -607,3 +607,20 @@ def test_a_host_that_has_met_only_those_who_cannot_know_it_ends_when_one_does() 
         await asyncio.gather(*tasks)
 
     run_in_virtual_time(main())
+
+
+def test_lines_that_wait_until_a_host_is_let_in_are_not_many(tmp_path: Path) -> None:
+    """The journal keeps them anew with each group."""
+    trace = tmp_path / "a.trace"
+    trace.write_text("what stood there")
+    recorder = Recorder(SPLIT.net, "", TraceFile(trace), None, ("a",))
+    recorder.may_write = False
+    for _ in range(HELD_BACK_MAX - 1):
+        recorder.note(0.0, "told")
+        assert recorder.writing() is None
+    assert trace.read_text() == "what stood there"
+    recorder.note(0.0, "told")
+    writing = recorder.writing()
+    assert writing is not None
+    writing()
+    assert trace.read_text().count("\n") == HELD_BACK_MAX + 1

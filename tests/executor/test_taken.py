@@ -233,7 +233,13 @@ IN_TIME = parse_net("""
 firable: 1
 cell: in_time
 controllers:
-  a: {start: free, places: {free: , busy: {send: {machine: A, command: WORK}, until: done, within: {time: 2s, to: late}}, late: , gone: }}
+  a:
+    start: free
+    places:
+      free:
+      busy: {send: {machine: A, command: WORK}, until: done, within: {time: 2s, to: late}}
+      late:
+      gone:
 transitions:
   begin: {from: a.free, to: a.busy}
   end: {from: a.busy, to: a.gone}
