@@ -6,9 +6,9 @@ anything. Of a process that nobody lets in nobody can have heard, and it is no l
 as it is, however often it is started.
 
 What it has heard of the age of others it keeps with whatever is kept next, from one repeat to the next: to write that
-for each message would cost more than the message. Where nothing else is kept it is kept by itself, once a minute, when
-a peer is lost, and when the host ends in order. What an outage of this host takes of that may let a copy pass that is
-not older than so long.
+for each message would cost more than the message. It is made durable by itself when more is heard and the last time
+was a minute ago, when a peer is lost, and when the host ends in order. Of what is heard otherwise an outage of this
+host may take the last, and a copy may pass that lacks no more than that.
 """
 
 from __future__ import annotations

@@ -121,7 +121,7 @@ class Groups:
             self.run.broken(InputError([Diagnostic(code, message, hint)]))
 
     async def write_last(self, patience: Patience) -> str:
-        """Write the lines of the trace that are left and, what was taken or, of other hosts, heard since the last sync.
+        """Write the lines of the trace that are left, and what machines have taken, or others said, since the sync.
 
         Returns a sentence where that had to be given up. Raises `InputError` F1017 or F5034 where it fails.
         """
