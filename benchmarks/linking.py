@@ -23,7 +23,6 @@ from bytes, strictly, and its answer written. What a phase takes beyond that is 
 from __future__ import annotations
 
 import asyncio
-import socket
 import subprocess
 import sys
 import time
@@ -39,6 +38,7 @@ import zenoh
 from measuring import Table, against
 
 from firable.executor.drivers.dry_run import DryRunDriver
+from firable.executor.drivers.far_side.ports import free_port
 from firable.executor.links.encoding import pack, unpack
 from firable.executor.links.lending import LendingLoop
 from firable.executor.links.link import COORDINATOR, Greeting
@@ -225,9 +225,7 @@ async def echo_by_loop(name: str, at: str) -> None:
 @contextmanager
 def processes(kind: str, bundle: Path) -> Iterator[str]:
     """The four other processes, and the address that they join."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        at = f"tcp/127.0.0.1:{free.getsockname()[1]}"
+    at = f"tcp/127.0.0.1:{free_port()}"
     script = [sys.executable, str(Path(__file__).resolve()), kind]
     started = [subprocess.Popen([*script, name, at, str(bundle)]) for name in CONTROLLERS]
     try:

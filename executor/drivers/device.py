@@ -186,6 +186,17 @@ def drop_at_close(transport: asyncio.BaseTransport | None) -> None:
         found.setsockopt(*DROPPING)
 
 
+def is_to_itself(transport: asyncio.BaseTransport | None) -> bool:
+    """Whether what is sent comes back, as the network gave a connection of this host the port that it was to reach.
+
+    It can do so where nobody listens (a simultaneous open of TCP). A write over Modbus is confirmed by saying it again,
+    so that such a connection would confirm whatever is written to it.
+    """
+    if transport is None or transport.get_extra_info("peername") is None:
+        return False
+    return bool(transport.get_extra_info("sockname") == transport.get_extra_info("peername"))
+
+
 class DeviceKind(Protocol):
     """A kind of device: how its options and addresses are written, and how one connects to it."""
 

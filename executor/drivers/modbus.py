@@ -18,6 +18,7 @@ from firable.executor.drivers.device import (
     Use,
     Wanted,
     drop_at_close,
+    is_to_itself,
     quiet,
 )
 from firable.executor.drivers.modbus_connection import ModbusConnection
@@ -121,6 +122,8 @@ async def _opened(
     try:
         if not await client.connect():
             raise LinkError(f"{where} does not answer")
+        if is_to_itself(client.ctx.transport):
+            raise LinkError(f"{where} does not answer: the connection leads to itself")
     except BaseException:
         client.close()
         raise

@@ -13,12 +13,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from support.link_rigs import free_port
 from support.waiting import PATIENCE_SECONDS, heard_in_time, until
 
 from firable.cli.main import main
 from firable.executor.drivers.far_side.machine import Machine
 from firable.executor.drivers.far_side.modbus_server import ModbusTcpEnd
+from firable.executor.drivers.far_side.ports import free_port
 from firable.semantics.trace import Noted, read_trace
 
 NET = """\

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 from support.certificates import Site
-from support.link_rigs import free_port
 from support.waiting import PATIENCE_SECONDS, heard_in_time, until
 
 from firable.cli.main import main
+from firable.executor.drivers.far_side.ports import free_port
 
 
 @pytest.fixture(scope="module")

@@ -19,6 +19,7 @@ from support.waiting import PATIENCE_SECONDS, heard_in_time
 from firable.cli.main import main
 from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.far_side.ends import PORTS, binding_text
+from firable.executor.drivers.far_side.ports import free_port
 from firable.executor.drivers.fitting import misfits
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.machines.plant_file import read_plant
@@ -28,12 +29,6 @@ from firable.semantics.trace import read_trace
 SCHEMA = json.loads(files("firable.cli").joinpath("io.schema.json").read_text(encoding="utf-8"))
 NET = catalogue_net("one_robot")
 SENSORS = read_plant(catalogue_path("one_robot").with_name("one_robot.plant.yaml")).sensors
-
-
-def free_port() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return str(probe.getsockname()[1])
 
 
 def firable(*arguments: str) -> subprocess.Popen[str]:
@@ -62,7 +57,7 @@ class Cell:
 def cell(tmp_path: Path) -> Iterator[Cell]:
     """The one-robot cell over Modbus, of which the completion of a grasp and the sensor of MC may be forced."""
     bind = tmp_path / "cell.bind.yaml"
-    text = unhurried(binding_text(NET, {"modbus": free_port()}, SENSORS))
+    text = unhurried(binding_text(NET, {"modbus": str(free_port())}, SENSORS))
     text = text.replace("write: {holding 10: 5}}", "write: {holding 10: 5}, force: true}")
     held = "mc.part_present: {device: modbus, read: coil 20, on_loss: hold, force: true}"
     bind.write_text("\n".join(f"  {held}" if "mc.part_present:" in line else line for line in text.split("\n")))
@@ -110,7 +105,7 @@ def test_a_program_reads_signals_as_lines_of_json_of_the_published_schema(
     assert main(["io", str(cell.bind), "--for", "2", "--format", "json"]) == 0
     assert 1 <= len(shown(capsys)) <= 3  # one for each change
     gone = tmp_path / "gone.bind.yaml"
-    text = binding_text(NET, {"modbus": free_port()}, SENSORS)
+    text = binding_text(NET, {"modbus": str(free_port())}, SENSORS)
     gone.write_text(text.replace("host: 127.0.0.1", "host: 127.0.0.1\n    start_s: 0.2"))
     assert main(["io", str(gone), "--once", "--format", "json"]) == 3
     (line,) = shown(capsys)
@@ -128,7 +123,7 @@ def test_looking_writes_nothing_and_sending_by_hand_is_for_what_the_binding_allo
 
 def test_what_cannot_be_read_is_told_and_unknown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bind = tmp_path / "c.bind.yaml"
-    text = binding_text(NET, {"modbus": free_port()}, SENSORS)
+    text = binding_text(NET, {"modbus": str(free_port())}, SENSORS)
     bind.write_text(text.replace("host: 127.0.0.1", "host: 127.0.0.1\n    start_s: 0.2"))
     assert main(["io", str(bind), "--once"]) == 3
     said = capsys.readouterr()

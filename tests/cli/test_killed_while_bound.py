@@ -9,12 +9,12 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from support.link_rigs import free_port
 from support.served_cells import unhurried
 from support.waiting import PATIENCE_SECONDS, heard_in_time
 
 from firable.cli.main import main
 from firable.executor.drivers.far_side.ends import binding_text
+from firable.executor.drivers.far_side.ports import free_port
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.machines.plant_file import read_plant
 from firable.semantics.replaying import replay

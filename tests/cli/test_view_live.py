@@ -15,7 +15,6 @@ from typing import cast
 import pytest
 from playwright.sync_api import Browser, Page, Route, expect
 from support.browser import PATIENCE_MS, browser, command, done, needs_browser, page_at
-from support.link_rigs import free_port
 from support.waiting import PATIENCE_SECONDS
 
 from firable.cli.main import main
@@ -23,6 +22,7 @@ from firable.cli.view.lanes import Lanes
 from firable.cli.view.live import own_part
 from firable.cli.view.votes import awaited
 from firable.executor import Host
+from firable.executor.drivers.far_side.ports import free_port
 from firable.nets.catalogue import catalogue_net
 from firable.semantics.trace import CommandSent, Fired, SignalChanged, read_trace
 

@@ -14,12 +14,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from support.link_rigs import free_port
 from support.served_cells import unhurried
 from support.waiting import PATIENCE_SECONDS, heard_in_time, until
 
 from firable.cli.main import main as firable
 from firable.executor.drivers.far_side.ends import binding_text
+from firable.executor.drivers.far_side.ports import free_port
 from firable.executor.links.lending import LendingLoop
 from firable.executor.own_time import COUNTED_SECONDS, OwnTimeLoop
 from firable.nets.catalogue import catalogue_net, catalogue_path

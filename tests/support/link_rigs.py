@@ -4,12 +4,12 @@ import asyncio
 import os
 import pty
 import random
-import socket
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from firable.executor.drivers.far_side.ports import free_port
 from firable.executor.links.in_process import Exchange, InProcessLink
 from firable.executor.links.link import COORDINATOR, Arrival, Greeting, Link, known_otherwise
 from firable.executor.links.serial_line import MASTER, SerialLink, addresses_on_a_line
@@ -248,11 +248,3 @@ async def over_a_serial_line() -> AsyncIterator[SerialRig]:
         yield rig
     finally:
         rig.close()
-
-
-def free_port() -> int:
-    """A port that nobody listens at."""
-    with socket.socket() as found:
-        found.bind(("127.0.0.1", 0))
-        port: int = found.getsockname()[1]
-        return port

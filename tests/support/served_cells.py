@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 
 import yaml
 from support.cells import decomposition_of, plant_of
-from support.link_rigs import free_port
 
 from firable.executor.cell.disturbances import Disturbance
 from firable.executor.cell.plant import Plant
@@ -17,6 +16,7 @@ from firable.executor.drivers.binding import Binding, parse_binding
 from firable.executor.drivers.far_side.cell import CellServer
 from firable.executor.drivers.far_side.end import FarEnd
 from firable.executor.drivers.far_side.ends import binding_text, ends_of
+from firable.executor.drivers.far_side.ports import free_port
 from firable.executor.drivers.far_side.serial_device import SerialEnd
 
 DECOMPOSITION = decomposition_of("one_robot")

@@ -16,6 +16,7 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 from firable.executor.drivers.device import Point, Value, quiet
 from firable.executor.drivers.far_side.end import Faults
 from firable.executor.drivers.far_side.line import PseudoLine
+from firable.executor.drivers.far_side.ports import free_port
 from firable.executor.drivers.modbus_points import BITS, Address, address
 
 REGISTERS = 256
@@ -92,7 +93,7 @@ class ModbusTcpEnd(ModbusServer):
 
     def __init__(self, port: int = 0, units: Collection[int] = ()) -> None:
         super().__init__()
-        self.port = port
+        self.port = port or free_port()
         self.units = {unit: ModbusUnit(self) for unit in units}
         self.server: ModbusTcpServer | None = None
 
@@ -119,10 +120,6 @@ class ModbusTcpEnd(ModbusServer):
         devices = [one.device(unit) for unit, one in self.units.items()] or self.device()
         self.server = ModbusTcpServer(devices, address=("127.0.0.1", self.port), trace_packet=self.garble)
         await self.server.serve_forever(background=True)
-        transport = self.server.transport
-        if not isinstance(transport, asyncio.Server):
-            raise AssertionError("a server that listens has its sockets")
-        self.port = transport.sockets[0].getsockname()[1]
 
 
 class ModbusUnit(ModbusServer):

@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import shutil
-import socket
 import tempfile
 from collections.abc import Callable, Collection
 from contextlib import suppress
@@ -19,19 +18,13 @@ from aiomqtt import Client, MqttError
 
 from firable.executor.drivers.device import Point, Value, quiet
 from firable.executor.drivers.far_side.end import Faults
+from firable.executor.drivers.far_side.ports import free_port
 from firable.executor.drivers.far_side.relay import Relay
 
 
 def mosquitto() -> str | None:
     """The broker's program, if it is installed; Debian puts it where ordinary users do not look."""
     return shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin")
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 class MqttEnd:
@@ -65,13 +58,13 @@ class MqttEnd:
         program = mosquitto()
         if program is None:
             raise FileNotFoundError("mosquitto is not installed")
-        self.behind = self.front = _free_port()
+        self.behind = self.front = free_port()
         self.folder = tempfile.TemporaryDirectory()
         configuration = Path(self.folder.name) / "mosquitto.conf"
         lines = ["per_listener_settings true", "persistence false", "set_tcp_nodelay true"]
         lines += [f"listener {self.behind} 127.0.0.1", "allow_anonymous true"]
         if self.secured:
-            self.front = _free_port()
+            self.front = free_port()
             lines += [f"listener {self.front} 127.0.0.1", self.secured]
         configuration.write_text("\n".join([*lines, ""]))
         quiet = asyncio.subprocess.DEVNULL

@@ -12,6 +12,7 @@ from contextlib import suppress
 from typing import Any
 
 from firable.executor.drivers.far_side.end import Faults
+from firable.executor.drivers.far_side.ports import free_port
 
 
 class Relay:
@@ -20,7 +21,7 @@ class Relay:
     def __init__(self, faults: Faults, port: int = 0, *, garbles: bool = True) -> None:
         self.faults = faults
         self.garbles = garbles
-        self.port = port
+        self.port = port or free_port()
         self.target = 0
         self.server: asyncio.Server | None = None
         self.carrying: set[asyncio.Task[None]] = set()
@@ -33,7 +34,6 @@ class Relay:
         """Lead to a port of this host."""
         self.target = target
         self.server = await asyncio.start_server(self._accepted, "127.0.0.1", self.port)
-        self.port = self.server.sockets[0].getsockname()[1]
 
     async def close(self) -> None:
         """Drop all connections, and take no new ones."""

@@ -7,7 +7,6 @@ from functools import partial
 
 import pytest
 from support.cells import plant_of
-from support.link_rigs import free_port
 from support.served_cells import DECOMPOSITION, NET, Served, halved, served, unhurried
 
 from firable.executor.cell.disturbances import Drops, NeverCompletes
@@ -16,6 +15,7 @@ from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.bound import bound_driver
 from firable.executor.drivers.far_side.ends import binding_text
 from firable.executor.drivers.far_side.mqtt_device import mosquitto
+from firable.executor.drivers.far_side.ports import free_port
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.service import patience_with

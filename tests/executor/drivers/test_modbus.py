@@ -9,6 +9,7 @@ from contextlib import asynccontextmanager
 from functools import partial
 
 import pytest
+from pymodbus.client import AsyncModbusTcpClient
 from pymodbus.framer import FramerRTU
 
 from firable.executor.drivers import modbus
@@ -16,6 +17,7 @@ from firable.executor.drivers.bench import PATIENCE_S, Far, until
 from firable.executor.drivers.conformance import DriverConformance
 from firable.executor.drivers.device import Connection, LinkError, Point, Value, Wanted
 from firable.executor.drivers.far_side.modbus_server import ModbusRtuEnd, ModbusTcpEnd
+from firable.executor.drivers.far_side.ports import free_port
 from firable.executor.drivers.modbus_connection import ModbusConnection
 
 POINTS = {
@@ -89,6 +91,20 @@ async def device_that_goes(has_asked: asyncio.Event, end: Callable[[asyncio.Stre
     server = await asyncio.start_server(serve, "127.0.0.1", 0)
     options = modbus.TcpOptions(host="127.0.0.1", port=server.sockets[0].getsockname()[1], every_s=0)
     return await modbus.TCP.connect(options, WANTED)
+
+
+def test_a_connection_that_leads_to_itself_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What it says would come back to it, and that is how a device confirms what is written to it."""
+    port = free_port()
+    itself = partial(AsyncModbusTcpClient, source_address=("127.0.0.1", port))
+    monkeypatch.setattr("pymodbus.client.AsyncModbusTcpClient", itself)
+
+    async def main() -> None:
+        options = modbus.TcpOptions(host="127.0.0.1", port=port, every_s=0)
+        with pytest.raises(LinkError, match="does not answer: the connection leads to itself"):
+            await modbus.TCP.connect(options, WANTED)
+
+    asyncio.run(main())
 
 
 @pytest.mark.parametrize(

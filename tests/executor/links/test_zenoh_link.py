@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 import zenoh
 from support.certificates import Site
-from support.link_rigs import PATIENCE_SECONDS, Heard, free_port, running
+from support.link_rigs import PATIENCE_SECONDS, Heard, running
 
 from firable.executor.drivers.bench import until
+from firable.executor.drivers.far_side.ports import free_port
 from firable.executor.links.encoding import pack
 from firable.executor.links.link import COORDINATOR, PROTOCOL_VERSION, Greeting
 from firable.executor.links.storages import Memory, Storage
