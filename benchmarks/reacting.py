@@ -150,6 +150,9 @@ class PingPong:
             self.listener.taken(place.name, entry)
         self.came.set()
 
+    async def met(self) -> None:
+        """At once."""
+
     async def ask(self, place: Place, entry: int) -> Answer:
         """What was sent last is done."""
         return Answer.DONE if (place.name, entry) == self.last else Answer.UNKNOWN

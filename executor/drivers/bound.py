@@ -147,6 +147,10 @@ class BoundDriver:
         if (command := self.binding.document.commands.get(place.name)) is not None:
             self.devices[command.device].channels[command.channel].withdraw(place.name)
 
+    async def met(self) -> None:
+        """Wait until each device was reached, or as long as its start may take."""
+        await asyncio.gather(*(device.met() for device in self.devices.values()))
+
     async def ask(self, place: Place, entry: int) -> Answer:
         """What became of a command that was sent before a restart; waits for its device as long as a start may take."""
         command = self._command(place.name)
@@ -155,9 +159,7 @@ class BoundDriver:
             self.completing[place.name] = place.completion
             self.completions.commanded(place.completion, entry)
         channel = device.channels[command.channel]
-        try:
-            await asyncio.wait_for(device.is_ready.wait(), device.document.start_s)
-        except TimeoutError:
+        if not await device.met():
             channel.expect(place.name, entry)
             return Answer.UNKNOWN
         stopped = bool(device.document.safe)

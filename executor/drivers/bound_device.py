@@ -92,6 +92,12 @@ class BoundDevice:
                 if alarm is not None:
                     alarm.cancel()
 
+    async def met(self) -> bool:
+        """Wait until there is a connection to it, as long as its start may take; whether there is one."""
+        with suppress(TimeoutError):
+            await asyncio.wait_for(self.is_ready.wait(), self.document.start_s)
+        return self.is_ready.is_set()
+
     def send(self, command: CommandDocument, place: Place, entry: int) -> None:
         """Send a command by its channel."""
         self.channels[command.channel].send(place.name, entry, str(place.command), self.writes[place.name])

@@ -143,6 +143,10 @@ class Driver(Protocol):
         """
         ...
 
+    async def met(self) -> None:
+        """Wait until each device was reached, or as long as its start may take: then what is told of it is so."""
+        ...
+
     async def ask(self, place: Place, entry: int) -> Answer:
         """What became of a command that was sent before a restart, as the machine tells it.
 

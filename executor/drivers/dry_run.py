@@ -70,6 +70,9 @@ class DryRunDriver:
     def withdraw(self, place: Place) -> None:
         """Nothing: a command is taken when it is sent."""
 
+    async def met(self) -> None:
+        """At once: there is no device that could be out of reach."""
+
     async def ask(self, place: Place, entry: int) -> Answer:
         """What became of a command: it is over, if there is one."""
         return Answer.DONE if place.command is not None and entry else Answer.UNKNOWN

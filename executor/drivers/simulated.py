@@ -128,6 +128,9 @@ class SimulatedDriver:
     def withdraw(self, place: Place) -> None:
         """Nothing: a command is taken when it is sent."""
 
+    async def met(self) -> None:
+        """At once: there is no device that could be out of reach."""
+
     async def ask(self, place: Place, entry: int) -> Answer:
         """What the plant knows of a command: nothing is ever lost on the way to it."""
         if (place.name, entry) in self.interrupted:
