@@ -204,7 +204,7 @@ async def ask(address: str, command: str, said: dict[str, str], caller: Caller) 
 def _told(answer: dict[str, Any]) -> str:
     lines = [f"{answer['state']}: {answer['message']}" if answer["message"] else str(answer["state"])]
     if "fired" in answer and not answer.get("refused"):
-        lines.insert(0, f"fired {answer['fired']}" if answer["fired"] else "nothing is enabled")
+        lines.insert(0, f"fired {answer['fired']}" if answer["fired"] else "no transition has fired")
     lines[:0] = [f"refused: {why}" for why in answer.get("refused", ())]
     lines.append(f"  tokens on {', '.join(answer['marking'])}")
     return "\n".join([*lines, *(f"  {blocked}" for blocked in answer["blocked"])])

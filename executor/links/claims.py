@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from firable.executor.links.link import LinkListener, come_back_without, run_by_two
+from firable.executor.links.standing import Standing
 from firable.executor.links.storages import Estranged, Storage
 
 
@@ -60,6 +61,8 @@ class Claims:
         """What each session claims, in the order in which they came."""
         self.storages: dict[str, Storage] = {}
         """What each says of the storage of its host."""
+        self.standings: dict[str, Standing] = {}
+        """How the host of each stands, where it does not go on."""
         self.given: dict[str, Said] = {}
         """What each session is answered."""
         self.taken: dict[str, Said] = {}
@@ -91,6 +94,19 @@ class Claims:
         elif self.taken.get(session) == said:  # and no newer one
             del self.taken[session]
         self._settle()
+
+    def stands(self, session: str, standing: Standing, *, taken_back: bool = False) -> None:
+        """The host of a session stands so, or takes back that it does."""
+        was = self.standings.get(session, Standing.GOING)
+        if taken_back and was is not standing:
+            return  # there was a newer word
+        now = Standing.GOING if taken_back else standing
+        self.standings[session] = now
+        if now is Standing.GOING:
+            del self.standings[session]
+        for name in self.machines.get(session, ()):
+            if now is not was and self.reached.get(name) == session:
+                self.listener.stands(name, now)
 
     def _settle(self) -> None:
         for session in self.machines:
@@ -128,6 +144,8 @@ class Claims:
             if is_connected and name not in self.reached:
                 self.reached[name] = session
                 self.listener.connected(name, self.storages[session])
+                if (standing := self.standings.get(session)) is not None:
+                    self.listener.stands(name, standing)
             elif not is_connected and self.reached.get(name) == session:
                 del self.reached[name]
                 self.listener.lost(name)

@@ -14,6 +14,7 @@ import asyncio
 from collections.abc import Iterable
 
 from firable.executor.links.link import Greeting, LinkListener, come_back_without, objection
+from firable.executor.links.standing import Standing
 from firable.executor.protocol.messages import Message
 
 
@@ -67,6 +68,7 @@ class InProcessLink:
         self.greeting = greeting
         self.listener: LinkListener | None = None
         self.peers: dict[str, InProcessLink] = {}
+        self.standing = Standing.GOING
 
     async def run(self, listener: LinkListener) -> None:
         """Be reached until cancelled."""
@@ -85,6 +87,17 @@ class InProcessLink:
         if peer is not None:
             asyncio.get_running_loop().call_soon(self._deliver, peer, sender, receiver, message, self._tell().age)
 
+    def stand(self, standing: Standing) -> None:
+        """Tell all others."""
+        self.standing = standing
+        for other in set(self.peers.values()):
+            asyncio.get_running_loop().call_soon(other.stands, self)
+
+    def stands(self, other: InProcessLink) -> None:
+        """Take how another host stands, if it is still reached."""
+        for name in _names_of(self.peers, other):
+            self._tell().stands(name, other.standing)
+
     def meet(self, other: InProcessLink) -> None:
         """Greet another host."""
         here, there = self._tell(), other._tell()
@@ -102,6 +115,8 @@ class InProcessLink:
             elif problem is None:
                 self.peers[name] = other
                 here.connected(name, theirs.storage)
+                if other.standing is not Standing.GOING:
+                    here.stands(name, other.standing)
 
     def lose(self, other: InProcessLink) -> None:
         """Another host is no longer reached."""

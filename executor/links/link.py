@@ -10,7 +10,7 @@ the names of the machines. Whoever holds another bundle is refused, with a diagn
 is delivered: two controllers of different nets could promise each other parts that do not exist.
 
 They also say what stable storage they have (`storages.py`): one that comes back without its own is refused (F5025), and
-is told so.
+is told so. And they say whether anything moves there (`standing.py`).
 
 Rejected: a link with acknowledged delivery. Its queue would hold old votes back behind a dead line and deliver them
 late, which the protocol must withstand anyway; and an end-to-end acknowledgement is needed all the same (O5).
@@ -22,12 +22,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
+from firable.executor.links.standing import Standing
 from firable.executor.links.storages import Estranged, Memory, Storage
 from firable.executor.protocol.messages import Message
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.source import printable
 
-PROTOCOL_VERSION: Final = 6
+PROTOCOL_VERSION: Final = 7
 """Which messages there are, what they mean and what links put beside them; hosts of different versions do not talk."""
 
 COORDINATOR: Final = ""
@@ -76,6 +77,10 @@ class LinkListener(Protocol):
         """The machine `peer` can no longer be reached, or has been started anew, which `connected` says then."""
         ...
 
+    def stands(self, peer: str, standing: Standing) -> None:
+        """The host of `peer`, which is connected, stands or goes on again; nothing is said of one that goes on."""
+        ...
+
     def refused(self, peer: str, problem: Diagnostic) -> None:
         """A host that calls itself `peer` was refused, or refuses this one; nothing of it is delivered."""
         ...
@@ -94,6 +99,10 @@ class Link(Protocol):
 
     def send(self, sender: str, receiver: str, message: Message) -> None:
         """Hand over a message of one of the own machines, without waiting; it may be lost."""
+        ...
+
+    def stand(self, standing: Standing) -> None:
+        """Have all that are or will be connected told whether this host lets anything move."""
         ...
 
 

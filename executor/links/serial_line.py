@@ -32,6 +32,7 @@ from pydantic import TypeAdapter, ValidationError
 from firable.executor.links.encoding import EncodingError, pack, unpack
 from firable.executor.links.framing import PAYLOAD_BYTES_MAX, Frame, FrameReader, Kind, pack_frame
 from firable.executor.links.link import Greeting, LinkListener, cannot_open, come_back_without, has_failed, objection
+from firable.executor.links.standing import Standing
 from firable.executor.links.storages import Memory, Met, Storage
 from firable.executor.protocol.messages import Message
 from firable.nets.interchange import canonical_json
@@ -45,6 +46,7 @@ BATCH_BYTES_MAX: Final = 512
 """Several messages go into one frame up to here: noise hits a long frame more often, and more is lost with it."""
 
 QUEUE_MAX: Final = 1000
+_STANDING_BYTES_MAX: Final = 16
 _BITS_A_BYTE: Final = 10
 
 
@@ -66,6 +68,8 @@ class _Said:
 
 _SAID: Final = TypeAdapter(_Said)
 _LINE: Final = TypeAdapter(tuple[str, str, str])
+_STANDINGS: Final = {canonical_json(standing.value): standing for standing in Standing}
+"""How a host stands, as the line that comes before its messages where it does not go on."""
 
 
 @dataclass(slots=True)
@@ -80,6 +84,7 @@ class _Peer:
     """The instance that was refused, which is told once."""
     queue: deque[bytes] = field(default_factory=lambda: deque(maxlen=QUEUE_MAX))
     """Messages for it, each the line of a frame. Of too many the oldest are lost."""
+    standing: Standing = Standing.GOING
     asked_at_cycle: int = 0
     is_there: bool = False
     """Of a station: whether it has answered the last poll."""
@@ -107,6 +112,7 @@ class SerialLink:
         self.lease_seconds = lease_seconds
         self.answer_seconds = answer_seconds
         self.instance = os.urandom(8).hex()
+        self.standing = Standing.GOING
         others = sorted({a for a in addresses.values() if a != own}) if own == MASTER else [MASTER]
         self.peers = {address: _Peer() for address in others}
         self.reader = FrameReader()
@@ -157,10 +163,14 @@ class SerialLink:
         if peer is None:
             return
         line = _line(sender, receiver, pack(self._tell().age, message))
-        if len(line) > PAYLOAD_BYTES_MAX:
+        if len(line) > PAYLOAD_BYTES_MAX - _STANDING_BYTES_MAX:
             self._break(has_failed(self.port, f"a message of {len(line):,} bytes is longer than a frame"))
         peer.queue.append(line)
         self.awake.set()
+
+    def stand(self, standing: Standing) -> None:
+        """Say with each frame from now on how this host stands."""
+        self.standing = standing
 
     # The master
 
@@ -242,10 +252,11 @@ class SerialLink:
             said = _Said(self.greeting, self.instance, str(memory.storage), known)
             payload = canonical_json(_SAID.dump_python(said, mode="json"))
             return pack_frame(Frame(to, self.own, Kind.GREETING, number, payload))
+        before = b"" if self.standing is Standing.GOING else canonical_json(self.standing.value) + b"\n"
         lines: list[bytes] = []
         while peer.queue and (not lines or len(peer.queue[0]) + sum(map(len, lines)) <= BATCH_BYTES_MAX):
             lines.append(peer.queue.popleft())
-        return pack_frame(Frame(to, self.own, Kind.MESSAGES, number, b"".join(lines)))
+        return pack_frame(Frame(to, self.own, Kind.MESSAGES, number, before + b"".join(lines)))
 
     def _heard(self, peer: _Peer, frame: Frame) -> None:
         """Take a frame of a host in."""
@@ -254,7 +265,13 @@ class SerialLink:
             case Kind.GREETING:
                 self._greeted(peer, frame.payload)
             case Kind.MESSAGES if peer.names:
-                for line in frame.payload.splitlines():
+                lines = frame.payload.splitlines()
+                standing = _STANDINGS.get(lines[0] if lines else b"", Standing.GOING)
+                if standing is not peer.standing:
+                    peer.standing = standing
+                    for name in peer.names:
+                        self._tell().stands(name, standing)
+                for line in lines[standing is not Standing.GOING :]:
                     self._message(peer, line)
 
     def _greeted(self, peer: _Peer, payload: bytes) -> None:
@@ -299,7 +316,7 @@ class SerialLink:
             self._tell().arrived(sender, receiver, message, age)
 
     def _lose(self, peer: _Peer) -> None:
-        names, peer.names, peer.instance = peer.names, (), ""
+        names, peer.names, peer.instance, peer.standing = peer.names, (), "", Standing.GOING
         peer.queue.clear()
         for name in names:
             self._tell().lost(name)

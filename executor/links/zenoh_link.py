@@ -47,6 +47,7 @@ from firable.executor.links.claims import Answer, Claims, Said
 from firable.executor.links.encoding import EncodingError, pack, unpack
 from firable.executor.links.lending import LendingLoop
 from firable.executor.links.link import COORDINATOR, Arrival, Greeting, LinkListener, cannot_open, objection
+from firable.executor.links.standing import Standing
 from firable.executor.links.storages import Storage
 from firable.executor.protocol.messages import Message
 from firable.nets.diagnostics import Diagnostic, Severity
@@ -95,6 +96,9 @@ class ZenohLink:
         self.claims: Claims | None = None
         self.answers: dict[str, Any] = {}  # tokens, the end of which Zenoh gives no type
         """What each session is answered."""
+        self.standing = Standing.GOING
+        self.stood: Any = None
+        """The token of that, where this host does not go on."""
         self.publishers: dict[tuple[str, str, str], zenoh.Publisher] = {}
         """For each sender here, receiver and session of the receiver."""
         self.damaged = 0
@@ -123,7 +127,8 @@ class ZenohLink:
                 kept.append(session.declare_subscriber(at, lambda s: self._on(loop, s, is_message=True)))
             claim = f"{_all_spelled(self.greeting.names)}/{self.identity}{_WITH}{listener.memory.storage}"
             kept.append(tokens.declare_token(f"{ours}/alive/{claim}"))
-            for heard in (f"{ours}/heard/{self.identity}/by/*/*/*", "firable/*/*/alive/*/*"):
+            self.stand(self.standing)
+            for heard in (f"{ours}/heard/{self.identity}/by/*/*/*", f"{ours}/stands/*/*", "firable/*/*/alive/*/*"):
                 take = partial(self._on, loop, is_message=False)
                 kept.append(tokens.declare_subscriber(heard, take, history=True))
             self.broken = loop.create_future()
@@ -132,6 +137,7 @@ class ZenohLink:
             self.session = self.listener = self.claims = None
             self.publishers.clear()
             self.answers.clear()
+            self.stood = None
             await asyncio.to_thread(session.close)
             self.samples.clear()  # what an earlier session has told is not so in a later one
 
@@ -151,6 +157,21 @@ class ZenohLink:
             publisher = self.session.declare_publisher(key, congestion_control=drop, express=True)
             self.publishers[to] = publisher
         publisher.put(pack(self.listener.age, message))
+
+    def stand(self, standing: Standing) -> None:
+        """Declare how this host stands, and only then take back what was declared before."""
+        self.standing = standing
+        if self.session is None:
+            return
+        if self.lending is not None and self.lending.is_lent:
+            self.lending.call_soon(self.stand, standing)
+            return
+        before, self.stood = self.stood, None
+        if standing is not Standing.GOING:
+            key = f"{self._ours()}/stands/{self.identity}/{standing}"
+            self.stood = self.session.liveliness().declare_token(key)
+        if before is not None:
+            before.undeclare()
 
     def _configuration(self) -> zenoh.Config:
         settings: dict[str, Any] = {
@@ -252,6 +273,10 @@ class ZenohLink:
             _, _, by, answer, machines = rest
             with suppress(ValueError):  # no answer that there is
                 claims.answered(by, Said(Answer(answer), _all_read(machines)), taken_back=gone)
+        elif what == "stands":
+            session, standing = rest
+            with suppress(ValueError):  # nothing that there is
+                claims.stands(session, Standing(standing), taken_back=gone)
         else:
             machines, claim = rest
             session, _, storage = claim.partition(_WITH)

@@ -28,6 +28,7 @@ from typing import Final
 from firable.executor.drivers.driver import Driver, Latched
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.links.link import Link
+from firable.executor.links.standing import Standing
 from firable.executor.operating import ending, latch, lives, restart, stopping
 from firable.executor.operating.acquaintances import Acquaintances
 from firable.executor.operating.acts import Acts
@@ -207,6 +208,15 @@ class Host:
             return self.net.names(self.recorder.marking)
         return tuple(place for one in self.controllers.values() for place in one.subnet.names(one.marking))
 
+    @property
+    def standing(self) -> Standing:
+        """What keeps everything standing here, as the other hosts are told; one that is ending is no news but lost."""
+        if self.latch is not None:
+            return Standing.LATCHED
+        if self.taking_up is not None:
+            return Standing.HELD
+        return Standing.PAUSED if self.paused and not self.stopping else Standing.GOING
+
     def situation(self) -> Situation:
         """What the host is doing, and what waits for what; exact at quiescence, as far as its machines know."""
         return ending.situation(self)
@@ -345,6 +355,7 @@ class Host:
     def settle(self) -> None:
         """At quiescence, wake who waits for it, and end the run if nothing will happen."""
         self._release()
+        self.peers.stand(self.standing)
         if self.ends_at_home and not self.stopping and not self.paused and stopping.ends_cycle(self):
             return
         ended = ending.ended(self)

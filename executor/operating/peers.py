@@ -27,6 +27,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
 from firable.executor.links.link import Arrival, Link, called, known_otherwise
+from firable.executor.links.standing import Standing
 from firable.executor.links.storages import Estranged, Memory, Storage
 from firable.executor.operating.acquaintances import KEEP_SECONDS, Acquaintances
 from firable.executor.operating.acts import Acts
@@ -79,6 +80,9 @@ class Peers:
         """Those that some machine here talks to."""
         self.connected_to: set[str] = set()
         self.met: set[str] = set()
+        self.standing = Standing.GOING
+        self.stand_still: dict[str, Standing] = {}
+        """Those of them on whose hosts nothing moves, and why."""
         self.meeting = asyncio.Event()
         self.turned_away: dict[str, str] = {}
         """What is said of each that was refused and has not come back as it should."""
@@ -142,6 +146,12 @@ class Peers:
         to_controller = isinstance(message, ToController)
         self.link.send(*((coordinator, controller) if to_controller else (controller, coordinator)), message)
 
+    def stand(self, standing: Standing) -> None:
+        """Have the others told whether this host lets anything move."""
+        if self.link is not None and standing is not self.standing:
+            self.standing = standing
+            self.link.stand(standing)
+
     def something_new(self) -> None:
         """Something was said for the first time: repeats begin anew."""
         if self.pause_seconds > self.repeat_seconds and self.timer is not None:
@@ -155,13 +165,15 @@ class Peers:
         yield from map(self._missing, self.never_met)
 
     def absent(self) -> Iterator[str]:
-        """Those that some machine here talks to and that are lost, in a sentence each.
+        """Those that some machine here talks to and that are lost, or stand, in a sentence each.
 
         Without them nothing of what they take part in goes on, also where nothing that was said waits for an answer.
         """
         for name in self.needed:
             if name in self.met and name not in self.connected_to:
                 yield f"{called(name)} is not connected"
+            elif (standing := self.stand_still.get(name)) is not None:
+                yield f"{called(name)} {standing.phrase}"
 
     @property
     def have_let_go(self) -> bool:
@@ -229,9 +241,18 @@ class Peers:
         """A peer can no longer be reached."""
         if peer in self.names:
             self.connected_to.discard(peer)
+            self.stand_still.pop(peer, None)
             self._keep_ages()
             waiting = [sentence for sentence in self.waits() if reached(peer, {peer}) in sentence]
             self.told("lost", "; ".join([f"{called(peer)} is lost", *waiting]))
+
+    def stands(self, peer: str, standing: Standing) -> None:
+        """The host of a peer has been paused, say, or goes on."""
+        if peer in self.names:
+            self.stand_still[peer] = standing
+            if standing is Standing.GOING:
+                del self.stand_still[peer]
+            self.told("stands", f"{called(peer)} {standing.phrase}")
 
     def refused(self, peer: str, problem: Diagnostic) -> None:
         """A host was refused."""

@@ -13,6 +13,7 @@ from firable.executor.drivers.far_side.ports import free_port
 from firable.executor.links.in_process import Exchange, InProcessLink
 from firable.executor.links.link import COORDINATOR, Arrival, Greeting, Link, known_otherwise
 from firable.executor.links.serial_line import MASTER, SerialLink, addresses_on_a_line
+from firable.executor.links.standing import Standing
 from firable.executor.links.storages import Estranged, Memory, Met, Storage
 from firable.executor.links.zenoh_link import ZenohLink
 from firable.executor.protocol.messages import Message
@@ -53,6 +54,10 @@ class Heard:
 
     def lost(self, peer: str) -> None:
         self.told.append(("lost", peer))
+        self._wake()
+
+    def stands(self, peer: str, standing: Standing) -> None:
+        self.told.append((standing, peer))
         self._wake()
 
     def refused(self, peer: str, problem: Diagnostic) -> None:

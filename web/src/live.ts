@@ -319,9 +319,9 @@ export class Live {
         this.frame.hint.textContent = `${words} is refused: ${answer.refused.join("; ")}.`;
         return;
       }
-      if (path === "step") announce(answer.fired ? `${answer.fired} has fired.` : "Nothing is enabled.");
+      if (path === "step") announce(answer.fired ? `${answer.fired} has fired.` : "No transition has fired.");
       else announce(`${words}: done.`);
-      if (path === "step" && !answer.fired) this.frame.hint.textContent = "Nothing is enabled: no step was done.";
+      if (path === "step" && !answer.fired) this.frame.hint.textContent = "No transition has fired.";
       else this.frame.hint.textContent = "";
     } catch (error) {
       const why = error instanceof Refused ? error.message : "the connection is lost";

@@ -14,6 +14,7 @@ from support.examples import examples
 
 from firable.executor.links.claims import Claims, Said
 from firable.executor.links.link import Arrival, known_otherwise
+from firable.executor.links.standing import Standing
 from firable.executor.links.storages import Estranged, Memory, Met, Storage
 from firable.executor.protocol.messages import Message
 from firable.nets.diagnostics import Diagnostic
@@ -30,6 +31,9 @@ class Party:
         self.before = memory
         """What it remembered when it was started."""
         self.connected_to: dict[str, Storage] = {}
+        self.standing = Standing.GOING
+        self.stand_still: dict[str, Standing] = {}
+        """How the others stand, as it was told."""
         self.was_connected: list[str] = []
         self.disowned_by: set[str] = set()
         self.refusals: list[tuple[str, Diagnostic]] = []
@@ -56,6 +60,11 @@ class Party:
 
     def lost(self, peer: str) -> None:
         del self.connected_to[peer]
+        self.stand_still.pop(peer, None)
+
+    def stands(self, peer: str, standing: Standing) -> None:
+        assert peer in self.connected_to
+        self.stand_still[peer] = standing
 
     def refused(self, peer: str, problem: Diagnostic) -> None:
         self.refusals.append((peer, problem))
@@ -80,6 +89,9 @@ class Wires:
         self.started += 1
         party = Party(self, self.started, names, memory)
         for other in self.parties:
+            if other.standing is not Standing.GOING:  # in any order with its claim
+                self.wire(other, party).append(partial(party.claims.stands, other.session, other.standing))
+        for other in self.parties:
             if not set(other.names) & set(names):  # or each is refused by the other, and not claimed
                 for one, its in ((party, other), (other, party)):
                     self.wire(one, its).append(partial(its.claims.claimed, one.session, one.names, one.memory.storage))
@@ -97,6 +109,16 @@ class Wires:
             self.standing[by.session, session] = said
             self.wire(by, to).append(partial(to.claims.answered, by.session, said))
 
+    def stand(self, party: Party, standing: Standing) -> None:
+        before, party.standing = party.standing, standing
+        for other in self.parties:
+            if other is not party and standing is not before:
+                if standing is not Standing.GOING:
+                    self.wire(party, other).append(partial(other.claims.stands, party.session, standing))
+                if before is not Standing.GOING:
+                    back = partial(other.claims.stands, party.session, before, taken_back=True)
+                    self.wire(party, other).append(back)
+
     def end(self, party: Party) -> None:
         self.parties.remove(party)
         for other in self.parties:
@@ -104,6 +126,8 @@ class Wires:
             last = [partial(other.claims.given_up, party.session)]
             if (said := self.standing.pop((party.session, other.session), None)) is not None:
                 last.append(partial(other.claims.answered, party.session, said, taken_back=True))
+            if party.standing is not Standing.GOING:
+                last.append(partial(other.claims.stands, party.session, party.standing, taken_back=True))
             self.dice.shuffle(last)  # who tells of the end of a session tells in any order what ends with it
             self.wire(party, other).extend(last)
 
@@ -151,6 +175,7 @@ def test_hosts_of_different_machines_end_connected_exactly_if_none_knows_another
     for pause in pauses:
         wires.deliver(pause)
         number = dice.randrange(3)
+        wires.stand(dice.choice(now), dice.choice(list(Standing)))
         wires.end(now[number])
         wires.deliver(dice.randrange(4))
         storages[number] = storages[number].in_new_life(f"life {wires.started}", dice.randrange(3))
@@ -161,6 +186,8 @@ def test_hosts_of_different_machines_end_connected_exactly_if_none_knows_another
             if one is not other:
                 is_connected = {name in one.connected_to for name in other.names}
                 assert is_connected == {fit(one, other)}
+                if fit(one, other):
+                    assert {one.stand_still.get(name, Standing.GOING) for name in other.names} == {other.standing}
                 estranged = knows_otherwise(other, one, when_started=True)
                 if estranged and not knows_otherwise(one, other, when_started=True):
                     assert one.disowned_by >= set(other.names)

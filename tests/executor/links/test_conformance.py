@@ -11,6 +11,7 @@ from support.link_rigs import PATIENCE_SECONDS, Heard, Rig, in_process, over_a_s
 
 from firable.executor.links.lending import LendingLoop
 from firable.executor.links.link import COORDINATOR, Greeting, Link
+from firable.executor.links.standing import Standing
 from firable.executor.links.storages import LIVES_MAX, Memory, Met, Storage
 from firable.executor.protocol.messages import Acknowledgement, Decision, Message, Readiness, Report, Vote, VoteRequest
 
@@ -177,6 +178,33 @@ class TestLink:
                         await deliver(there, centre, "robot", COORDINATOR, TO_COORDINATOR)
                         centre.messages.clear()
                 assert set(centre.ages) == {3, 1 << 40}
+
+        run(make, main())
+
+    def test_how_a_host_stands_is_told_to_whoever_is_connected(self, make: Make) -> None:
+        """Before they meet, while they are connected, and when they meet again."""
+
+        async def main() -> None:
+            async with make() as rig:
+                here, there = rig.link(CENTRE), rig.link(ROBOT)
+                there.stand(Standing.HELD)
+                async with asyncio.timeout(PATIENCE_SECONDS), running(here) as centre, running(there) as robot:
+                    await robot.until_told(("connected", COORDINATOR))
+                    await centre.until_told(("held", "robot"))
+                    await deliver(there, centre, "robot", COORDINATOR, TO_COORDINATOR)
+                    there.stand(Standing.GOING)
+                    await centre.until_told(("going", "robot"))
+                    there.stand(Standing.PAUSED)
+                    await centre.until_told(("paused", "robot"))
+                    rig.cut()
+                    await centre.until_told(("lost", "robot"))
+                    there.stand(Standing.LATCHED)
+                    rig.mend()
+                    await centre.until_told(("latched", "robot"))
+                    await deliver(here, robot, COORDINATOR, "robot", TO_CONTROLLER)
+                    told = [what for what, _ in centre.told]
+                    assert told.index("connected") < told.index("held") < told.index("going") < told.index("paused")
+                    assert {what for what, _ in robot.told} <= {"connected", "lost"}
 
         run(make, main())
 

@@ -168,10 +168,12 @@ SHAPES = {
     4: "b9084ed7cd0575f6",
     5: "b9084ed7cd0575f6",
     6: "b9084ed7cd0575f6",
+    7: "b9084ed7cd0575f6",
 }
 """What the messages of each version of the protocol look like; one that was in use keeps its line.
 
-Version 5 differs in how hosts greet, version 6 in that, too, and in the age beside each message.
+Version 5 differs in how hosts greet, version 6 in that, too, and in the age beside each message; in version 7 hosts say
+whether anything moves there.
 """
 
 
