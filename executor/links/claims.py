@@ -135,9 +135,8 @@ class Claims:
         self.say(session, said)
         if not said.is_heard:
             is_second = said.answer is Answer.SECOND
-            problem = run_by_two(said.machines) if is_second else come_back_without(said.estranged)
-            for name in self.machines[session]:
-                self.listener.refused(name, problem)
+            why = run_by_two(said.machines) if is_second else come_back_without(said.estranged)
+            self.listener.refused(self.machines[session], why)
 
     def _connect(self, session: str, *, is_connected: bool) -> None:
         for name in self.machines[session]:
@@ -158,8 +157,7 @@ class Claims:
         is_right = self.given[session].is_heard or taken.answer is Answer.OUTDATED
         if is_right and self.told.get(session) != taken:
             self.told[session] = taken
-            for name in self.machines[session]:
-                if taken.answer is Answer.SECOND:
-                    self.listener.refused(name, run_by_two(taken.machines))
-                else:
-                    self.listener.disowned(name, taken.estranged)
+            if taken.answer is Answer.SECOND:
+                self.listener.refused(self.machines[session], run_by_two(taken.machines))
+            else:
+                self.listener.disowned(self.machines[session], taken.estranged)

@@ -102,21 +102,20 @@ class InProcessLink:
         """Greet another host."""
         here, there = self._tell(), other._tell()
         ours, theirs = here.memory, there.memory
-        problem = objection(self.greeting, other.greeting)
+        why = objection(self.greeting, other.greeting)
         come_back = ours.estranged(other.greeting.names, theirs.storage)
         forgotten = theirs.estranged(self.greeting.names, ours.storage)
-        if problem is None and come_back is not None:
-            problem = come_back_without(come_back)
-        for name in other.greeting.names:
-            if problem is not None:
-                here.refused(name, problem)
-            if forgotten is not None and (problem is None or forgotten.is_older):
-                here.disowned(name, forgotten)
-            elif problem is None:
-                self.peers[name] = other
-                here.connected(name, theirs.storage)
-                if other.standing is not Standing.GOING:
-                    here.stands(name, other.standing)
+        if why is None and come_back is not None:
+            why = come_back_without(come_back)
+        if why is not None:
+            here.refused(other.greeting.names, why)
+        if forgotten is not None and (why is None or forgotten.is_older):
+            here.disowned(other.greeting.names, forgotten)
+        for name in other.greeting.names if why is None and forgotten is None else ():
+            self.peers[name] = other
+            here.connected(name, theirs.storage)
+            if other.standing is not Standing.GOING:
+                here.stands(name, other.standing)
 
     def lose(self, other: InProcessLink) -> None:
         """Another host is no longer reached."""

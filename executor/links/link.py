@@ -7,7 +7,8 @@ names, and only between hosts that hold the same bundle.
 
 At each connection both sides say who they are (`Greeting`): the version of the protocol, the digest of the bundle and
 the names of the machines. Whoever holds another bundle is refused, with a diagnostic that says so, and nothing of it
-is delivered: two controllers of different nets could promise each other parts that do not exist.
+is delivered: two controllers of different nets could promise each other parts that do not exist. A refusal is told
+once, with all machines of the host.
 
 They also say what stable storage they have (`storages.py`): one that comes back without its own is refused (F5025), and
 is told so. And they say whether anything moves there (`standing.py`).
@@ -42,6 +43,15 @@ class Greeting:
     digest: str
     names: tuple[str, ...]
     version: int = PROTOCOL_VERSION
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """Why a host is refused."""
+
+    problem: Diagnostic
+    are_unlike: bool = False
+    """Whether the two hosts have another bundle or version: neither will let the other in with what it has."""
 
 
 Arrival = tuple[str, str, Message, int]
@@ -81,12 +91,12 @@ class LinkListener(Protocol):
         """The host of `peer`, which is connected, stands or goes on again; nothing is said of one that goes on."""
         ...
 
-    def refused(self, peer: str, problem: Diagnostic) -> None:
-        """A host that calls itself `peer` was refused, or refuses this one; nothing of it is delivered."""
+    def refused(self, peers: Sequence[str], why: Refusal) -> None:
+        """A host that says it runs these machines was refused, or refuses this one; nothing of it is delivered."""
         ...
 
-    def disowned(self, peer: str, why: Estranged) -> None:
-        """The host of `peer` refuses this one, because of what it knows of the storage of machines here."""
+    def disowned(self, peers: Sequence[str], why: Estranged) -> None:
+        """The host of these machines refuses this one, because of what it knows of the storage of machines here."""
         ...
 
 
@@ -115,41 +125,52 @@ def called(name: str) -> str:
     return f"'{printable(name)}'" if name != COORDINATOR else "the coordinator"
 
 
-def objection(ours: Greeting, theirs: Greeting) -> Diagnostic | None:
+def all_called(names: Iterable[str]) -> str:
+    """The machines of a host in a sentence.
+
+    >>> all_called(["mc", COORDINATOR])
+    "'mc', the coordinator"
+    """
+    return ", ".join(map(called, names))
+
+
+def objection(ours: Greeting, theirs: Greeting) -> Refusal | None:
     """Why a peer is refused (F5020), or None where it is not."""
-    who = ", ".join(map(called, theirs.names)) or "a host without machines"
+    who = all_called(theirs.names) or "a host without machines"
     if theirs.version != ours.version:
         message = f"{who} speaks version {theirs.version} of the protocol, and this host version {ours.version}"
-        return Diagnostic("F5020", message, "install the same version of firable on all hosts of the cell")
+        hint = "install the same version of firable on all hosts of the cell"
+        return Refusal(Diagnostic("F5020", message, hint), are_unlike=True)
     if theirs.digest != ours.digest:
         message = f"{who} holds another bundle: {printable(theirs.digest[:16])}…, and this host {ours.digest[:16]}…"
-        return Diagnostic("F5020", message, "give all hosts of the cell the same bundle file, and start them again")
+        hint = "give all hosts of the cell the same bundle file, and start them again"
+        return Refusal(Diagnostic("F5020", message, hint), are_unlike=True)
     if both := sorted(set(ours.names) & set(theirs.names)):
         return run_by_two(both)
     return None
 
 
-def run_by_two(machines: Iterable[str]) -> Diagnostic:
+def run_by_two(machines: Iterable[str]) -> Refusal:
     """Why the second host of these machines is refused (F5020)."""
-    message = f"{', '.join(map(called, machines))} is run by two hosts"
-    return Diagnostic("F5020", message, "each machine has one host: end one of the two")
+    message = f"{all_called(machines)} is run by two hosts"
+    return Refusal(Diagnostic("F5020", message, "each machine has one host: end one of the two"))
 
 
-def come_back_without(why: Estranged) -> Diagnostic:
+def come_back_without(why: Estranged) -> Refusal:
     """Why a host is refused that is not the one that was met (F5025)."""
     lacks = "what was kept there: the journal is another one, or there is none"
     if why.is_older:
         lacks = "the last that was kept there: the journal is an older copy"
-    message = f"{', '.join(map(called, why.machines))} came back without {lacks}"
-    return Diagnostic("F5025", message, _with_its_journal("it", why))
+    message = f"{all_called(why.machines)} came back without {lacks}"
+    return Refusal(Diagnostic("F5025", message, _with_its_journal("it", why)))
 
 
-def known_otherwise(why: Estranged, peer: str) -> Diagnostic:
-    """Why the host of `peer` refuses this one (F5025)."""
-    who = ", ".join(map(called, why.machines))
-    message = f"{called(peer)} has worked with another journal of {who} than this host has"
+def known_otherwise(why: Estranged, peers: Iterable[str]) -> Diagnostic:
+    """Why the host of these machines refuses this one (F5025)."""
+    who, by = all_called(why.machines), f"the host of {all_called(peers)}"
+    message = f"{by} has worked with another journal of {who} than this host has"
     if why.is_older:
-        message = f"{called(peer)} has worked with a later state of the journal of {who}: this host has an older copy"
+        message = f"{by} has worked with a later state of the journal of {who}: this host has an older copy"
     return Diagnostic("F5025", message, _with_its_journal("this host", why))
 
 

@@ -283,10 +283,10 @@ class SerialLink:
         here, ours, theirs = self._tell(), self._tell().memory, said.memory
         come_back = ours.estranged(said.greeting.names, theirs.storage)
         forgotten = theirs.estranged(self.greeting.names, ours.storage)
-        problem = objection(self.greeting, said.greeting)
-        if problem is None and come_back:
-            problem = come_back_without(come_back)
-        is_fit = problem is None and not forgotten
+        why = objection(self.greeting, said.greeting)
+        if why is None and come_back:
+            why = come_back_without(come_back)
+        is_fit = why is None and not forgotten
         if peer.names and self.own == MASTER:
             self._lose(peer)  # it was asked for messages, and does not know us: the next poll is a greeting
             return
@@ -295,11 +295,10 @@ class SerialLink:
         if not is_fit:
             if peer.refused != said.instance:
                 peer.refused = said.instance
-                for name in said.greeting.names:
-                    if problem is not None:
-                        here.refused(name, problem)
-                    if forgotten is not None and (problem is None or forgotten.is_older):
-                        here.disowned(name, forgotten)
+                if why is not None:
+                    here.refused(said.greeting.names, why)
+                if forgotten is not None and (why is None or forgotten.is_older):
+                    here.disowned(said.greeting.names, forgotten)
         elif not peer.names:
             peer.names, peer.instance = said.greeting.names, said.instance
             for name in peer.names:

@@ -283,9 +283,9 @@ class ZenohLink:
             if session == self.identity:
                 return
             greeting = Greeting(_read(digest), _all_read(machines), int(version) if version.isdecimal() else -1)
-            if (problem := objection(self.greeting, greeting)) is not None:
-                for name in greeting.names if not gone else ():
-                    listener.refused(name, problem)
+            if (why := objection(self.greeting, greeting)) is not None:
+                if not gone:
+                    listener.refused(greeting.names, why)
             elif gone:
                 claims.given_up(session)
             else:

@@ -17,6 +17,12 @@ that was mistyped or left out looks like the first start of a cell, and only the
 that, or before anybody was met since this host was started, it ends: its places of the start are wrong. If they have
 heard later things of this very journal, it ends whoever was met: its places are old, and nobody but it knows of others.
 
+*Another bundle or version*: of two such hosts neither can know which is wrong, and neither will be let in by the other.
+One that nobody has ever let in ends when all coordinators of its machines refuse it so: it can do nothing without them
+(F5020). One that was let in before is right, and goes on. The host of the coordinator at the top waits for others, who
+are let in by it: what comes to it by mistake, from another cell or of an old release, is told, and ends nobody here.
+Rejected: that both end. Whoever starts a wrong host would then end the right ones that wait beside it.
+
 Where all machines are on one host there are no others, and this does nothing.
 """
 
@@ -26,7 +32,7 @@ import asyncio
 from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
-from firable.executor.links.link import Arrival, Link, called, known_otherwise
+from firable.executor.links.link import Arrival, Link, Refusal, all_called, called, known_otherwise
 from firable.executor.links.standing import Standing
 from firable.executor.links.storages import Estranged, Memory, Storage
 from firable.executor.operating.acquaintances import KEEP_SECONDS, Acquaintances
@@ -35,7 +41,7 @@ from firable.executor.operating.waits import reached, waits
 from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import Message, ToController
 from firable.nets.decomposition import Decomposition
-from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.diagnostics import InputError
 
 REPEAT_SECONDS: Final = 0.2
 REPEAT_SECONDS_MAX: Final = 3.2
@@ -72,11 +78,12 @@ class Peers:
         self.repeat_seconds = self.pause_seconds = repeat_seconds
         here = {*acts.coordinators, *acts.controllers}
         self.names = {*coordinators(decomposition), *(subnet.name for subnet in decomposition.subnets)} - here
-        deciding = {above for controller in acts.controllers.values() for above in controller.above}
+        self.deciding = {above for controller in acts.controllers.values() for above in controller.above} - here
+        """The coordinators elsewhere of machines here."""
         voting = {
             c for each in acts.coordinators.values() for took_part in each.participants.values() for c in took_part
         }
-        self.needed = tuple(sorted((deciding | voting) - here))
+        self.needed = tuple(sorted(self.deciding | (voting - here)))
         """Those that some machine here talks to."""
         self.connected_to: set[str] = set()
         self.met: set[str] = set()
@@ -86,6 +93,8 @@ class Peers:
         self.meeting = asyncio.Event()
         self.turned_away: dict[str, str] = {}
         """What is said of each that was refused and has not come back as it should."""
+        self.unlike: set[str] = set()
+        """Those that were met with another bundle or version."""
         self.keep_due_seconds = 0.0
         """When ages that were heard are made durable by themselves."""
         self.is_due = False
@@ -162,7 +171,7 @@ class Peers:
         yield from waits(self.acts.coordinators, self.acts.controllers, self.names - self.connected_to)
         if self.is_unmet:
             yield "nothing moves here before another host of the cell has been met"
-        yield from map(self._missing, self.never_met)
+        yield from dict.fromkeys(map(self._missing, self.never_met))
 
     def absent(self) -> Iterator[str]:
         """Those that some machine here talks to and that are lost, or stand, in a sentence each.
@@ -254,22 +263,30 @@ class Peers:
                 del self.stand_still[peer]
             self.told("stands", f"{called(peer)} {standing.phrase}")
 
-    def refused(self, peer: str, problem: Diagnostic) -> None:
-        """A host was refused."""
-        self._turn_away(peer, f"{called(peer)} is refused", problem)
+    def refused(self, peers: Sequence[str], why: Refusal) -> None:
+        """A host was refused: where nobody ever let this one in, and all who decide for it are unlike it, it ends."""
+        if why.are_unlike:
+            self.unlike.update(peers)
+        if self.is_unmet and self.deciding and self.deciding <= self.unlike:
+            self.end(InputError([why.problem]))
+        else:
+            self._turn_away(
+                peers, f"the host of {all_called(peers)} is refused: {why.problem.message}; {why.problem.hint}"
+            )
 
-    def disowned(self, peer: str, why: Estranged) -> None:
+    def disowned(self, peers: Sequence[str], why: Estranged) -> None:
         """A host knows machines here by another storage: where nobody has shown that this one is right, it ends.
 
         An older copy of the same one ends in any case.
         """
-        problem = known_otherwise(why, peer)
-        self._turn_away(peer, f"{called(peer)} refuses this host", problem)
+        problem = known_otherwise(why, peers)
         if why.is_older or self.is_unmet or not self.met:
             self.end(InputError([problem]))
+        else:
+            self._turn_away(peers, f"this host is refused: {problem.message}; {problem.hint}")
 
-    def _turn_away(self, peer: str, what: str, problem: Diagnostic) -> None:
-        said = self.turned_away[peer] = f"{what}: {problem.message}; {problem.hint}"
+    def _turn_away(self, peers: Sequence[str], said: str) -> None:
+        self.turned_away.update(dict.fromkeys(peers, said))
         self.told("refused", said)
 
     # Time

@@ -14,7 +14,7 @@ from firable.executor.drivers.driver import Answer as DriversAnswer
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import MemoryJournal
 from firable.executor.links.in_process import Exchange, InProcessLink
-from firable.executor.links.link import COORDINATOR, Greeting
+from firable.executor.links.link import COORDINATOR, Greeting, Refusal
 from firable.executor.links.storages import Storage
 from firable.executor.operating.host import Host
 from firable.executor.operating.peers import REPEAT_SECONDS, REPEAT_SECONDS_MAX
@@ -502,7 +502,8 @@ def test_a_machine_that_was_refused_is_not_told_to_be_missing(tmp_path: Path) ->
         cell = Cell(tmp_path, (CENTRE, ("system", "mc", "conveyor")))
         await asyncio.sleep(1)
         centre = cell.hosts[CENTRE]
-        centre.peers.refused("robot", Diagnostic("F5020", "'robot' holds another bundle", "give it this one"))
+        problem = Diagnostic("F5020", "'robot' holds another bundle", "give it this one")
+        centre.peers.refused(ROBOT, Refusal(problem, are_unlike=True))
         await asyncio.sleep(9)
         assert not [sentence for kind, sentence in cell.told if kind == "never-met"]
         assert "'robot' is refused: 'robot' holds another bundle; give it this one" in centre.situation().message

@@ -146,7 +146,7 @@ def test_a_cell_that_was_begun_anew_is_not_ended_by_a_host_of_the_old_one(tmp_pa
         assert not any(cell.tasks[machines].done() for machines in (CENTRE, ("system",), ("mc",), CONVEYOR))
         refused = [sentence for kind, sentence in cell.told if kind == "refused"]
         assert any("the coordinator came back without what was kept there" in sentence for sentence in refused)
-        ours = "'robot' refuses this host: 'robot' has worked with another journal of the coordinator than this"
+        ours = "this host is refused: the host of 'robot' has worked with another journal of the coordinator than"
         assert any(ours in sentence for sentence in refused)
         assert cell.hosts[ROBOT].situation().state is State.HELD
         for task in cell.tasks.values():

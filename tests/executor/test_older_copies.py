@@ -83,7 +83,7 @@ def test_a_host_with_an_older_copy_ends_also_where_others_were_met_that_have_hea
         assert run.peers.met == {"b"}
         tasks.append(asyncio.create_task(hosts.host((COORDINATOR,), memory).main()))
         problem = await refusal(ending)
-        assert "the coordinator has worked with a later state of the journal of 'a'" in problem.message
+        assert "the host of the coordinator has worked with a later state of the journal of 'a'" in problem.message
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks)

@@ -26,7 +26,7 @@ from firable.cli.view.moment import moment_of
 from firable.decompose.protocol.exploring import explore_protocol
 from firable.decompose.protocol.wrong import WRONG, example
 from firable.executor.journal.sqlite_journal import SqliteJournal
-from firable.executor.links.link import Greeting, come_back_without, objection
+from firable.executor.links.link import Greeting, Refusal, come_back_without, objection
 from firable.executor.links.storages import Estranged
 from firable.executor.links.zenoh_link import open_to_the_network
 from firable.executor.operating.control import Endpoint, listening
@@ -93,12 +93,17 @@ def a_protocol_that_reads_copies_of_gates(_: Path) -> str:
     return "\n".join((verdict.statement, *reasons(found.protocol.net, verdict)))
 
 
+def _refused(why: Refusal | None) -> str:
+    assert why is not None
+    return str(why.problem)
+
+
 def a_host_with_another_bundle(_: Path) -> str:
-    return str(objection(Greeting("0" * 64, ("",)), Greeting("1" * 64, ("robot",))))
+    return _refused(objection(Greeting("0" * 64, ("",)), Greeting("1" * 64, ("robot",))))
 
 
 def a_host_without_its_journal(_: Path) -> str:
-    return str(come_back_without(Estranged(("robot",), is_older=False)))
+    return _refused(come_back_without(Estranged(("robot",), is_older=False)))
 
 
 def an_address_without_tls(_: Path) -> str:

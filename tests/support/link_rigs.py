@@ -11,7 +11,7 @@ from typing import Protocol
 
 from firable.executor.drivers.far_side.ports import free_port
 from firable.executor.links.in_process import Exchange, InProcessLink
-from firable.executor.links.link import COORDINATOR, Arrival, Greeting, Link, known_otherwise
+from firable.executor.links.link import COORDINATOR, Arrival, Greeting, Link, Refusal, known_otherwise
 from firable.executor.links.serial_line import MASTER, SerialLink, addresses_on_a_line
 from firable.executor.links.standing import Standing
 from firable.executor.links.storages import Estranged, Memory, Met, Storage
@@ -60,14 +60,14 @@ class Heard:
         self.told.append((standing, peer))
         self._wake()
 
-    def refused(self, peer: str, problem: Diagnostic) -> None:
-        self.told.append(("refused", peer))
-        self.problems.append(problem)
+    def refused(self, peers: Sequence[str], why: Refusal) -> None:
+        self.told += [("refused", peer) for peer in peers]
+        self.problems.append(why.problem)
         self._wake()
 
-    def disowned(self, peer: str, why: Estranged) -> None:
-        self.told.append(("disowned", peer))
-        self.problems.append(known_otherwise(why, peer))
+    def disowned(self, peers: Sequence[str], why: Estranged) -> None:
+        self.told += [("disowned", peer) for peer in peers]
+        self.problems.append(known_otherwise(why, peers))
         self._wake()
 
     async def until(self, condition: Callable[[], bool]) -> None:

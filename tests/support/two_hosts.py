@@ -8,7 +8,7 @@ from firable.decompose import split
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import Journal
 from firable.executor.links.in_process import Exchange, InProcessLink
-from firable.executor.links.link import Greeting
+from firable.executor.links.link import PROTOCOL_VERSION, Greeting
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.situation import Situation
@@ -47,9 +47,11 @@ class Hosts:
         self.exchange = Exchange()
         self.driver = Counting([SPLIT.subnet("a")], 1.0)
 
-    def host(self, machines: tuple[str, ...], journal: Journal) -> Host:
-        """A host that is not started yet."""
-        link = InProcessLink(self.exchange, Greeting("d", machines))
+    def host(
+        self, machines: tuple[str, ...], journal: Journal, digest: str = "d", version: int = PROTOCOL_VERSION
+    ) -> Host:
+        """A host that is not started yet, with the bundle of this digest and this version of the protocol."""
+        link = InProcessLink(self.exchange, Greeting(digest, machines, version))
         driver = self.driver if machines == ("a",) else DryRunDriver([SPLIT.subnet("b")], 1.0)
         recorder = Recorder(SPLIT.net, "", None, None, machines)
         return Host(SPLIT, driver, recorder, machines=machines, link=link, journal=journal)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from support.examples import examples
 
 from firable.executor.links.claims import Claims, Said
-from firable.executor.links.link import Arrival, known_otherwise
+from firable.executor.links.link import Arrival, Refusal, known_otherwise
 from firable.executor.links.standing import Standing
 from firable.executor.links.storages import Estranged, Memory, Met, Storage
 from firable.executor.protocol.messages import Message
@@ -36,7 +36,7 @@ class Party:
         """How the others stand, as it was told."""
         self.was_connected: list[str] = []
         self.disowned_by: set[str] = set()
-        self.refusals: list[tuple[str, Diagnostic]] = []
+        self.refusals: list[Diagnostic] = []
         self.claims = Claims(self, self.say)
 
     def say(self, session: str, said: Said | None) -> None:
@@ -66,12 +66,13 @@ class Party:
         assert peer in self.connected_to
         self.stand_still[peer] = standing
 
-    def refused(self, peer: str, problem: Diagnostic) -> None:
-        self.refusals.append((peer, problem))
+    def refused(self, peers: Sequence[str], why: Refusal) -> None:
+        assert peers
+        self.refusals.append(why.problem)
 
-    def disowned(self, peer: str, why: Estranged) -> None:
-        self.refusals.append((peer, known_otherwise(why, peer)))
-        self.disowned_by.add(peer)
+    def disowned(self, peers: Sequence[str], why: Estranged) -> None:
+        self.refusals.append(known_otherwise(why, peers))
+        self.disowned_by.update(peers)
 
 
 class Wires:
@@ -211,7 +212,7 @@ def test_of_two_hosts_with_a_machine_in_common_one_is_connected_and_the_other_wh
     assert centre.memory.known.keys() == set(heard.names)
     assert centre.was_connected == list(heard.names)
     assert not other.was_connected
-    assert {problem.message for _, problem in other.refusals} == {"'a' is run by two hosts"}
+    assert {problem.message for problem in other.refusals} == {"'a' is run by two hosts"}
     wires.end(heard)
     wires.all_delivered()
     assert centre.connected_to.keys() == set(other.names)
