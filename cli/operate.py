@@ -141,19 +141,30 @@ def operate(
         )
     if (cert or ca) and not address.startswith("https://"):
         raise click.UsageError("--cert and --ca are of https:// addresses")
-    place, is_said, word = (what or "").partition("=")
-    if (command == "say") != bool(is_said and place and word) or (what is not None and command != "say"):
-        raise click.UsageError("say what became of a command: say PLACE=done, =working or =not-received")
+    said = _said(command, what)
     caller = Caller(
         "" if token_file is None else _token_read(Path(token_file)),
         _client_tls(ca, cert) if address.startswith("https://") else None,
         has_authority=ca is not None,
         has_certificate=cert is not None,
     )
-    said = {"place": place, "answer": word.replace("-", " ")} if command == "say" else {}
     answer, is_refused = asyncio.run(ask(address.rstrip("/"), command, said, caller))
     click.echo(answer, nl=command != "metrics")
     return 1 if is_refused else 0
+
+
+def _said(command: str, what: str | None) -> dict[str, str]:
+    """What is told with a command; raises `click.UsageError` where it is not what the command takes."""
+    from firable.executor.protocol.commands import SAID
+
+    if command != "say":
+        if what is not None:
+            raise click.UsageError(f"{command} takes nothing after it: leave out '{what}'; PLACE=ANSWER is for say")
+        return {}
+    place, _, word = (what or "").partition("=")
+    if not place or word not in SAID:
+        raise click.UsageError("say what became of a command: say PLACE=done, =working or =not-received")
+    return {"place": place, "answer": SAID[word].value}
 
 
 @dataclass(frozen=True)

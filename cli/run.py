@@ -231,12 +231,11 @@ def _files_beside(journal: str | None) -> tuple[str, ...]:
 
 def _said(net: Net, say: tuple[str, ...], journal: str | None) -> dict[str, Answer]:
     """What the operator says of commands, by place."""
-    from firable.executor import Answer
+    from firable.executor.protocol.commands import SAID
     from firable.nets.diagnostics import with_meant
 
     if say and journal is None:
         raise click.UsageError("--say is of a run that is taken up: name its --journal")
-    words = {answer.value.replace(" ", "-"): answer for answer in Answer if answer is not Answer.UNKNOWN}
     said: dict[str, Answer] = {}
     for option in say:
         place, _, word = option.partition("=")
@@ -244,9 +243,9 @@ def _said(net: Net, say: tuple[str, ...], journal: str | None) -> dict[str, Answ
         if place not in commanding:
             message = f"--say {option}: no place '{place}' sends a command"
             raise click.UsageError(with_meant(message, place, commanding))
-        if word not in words:
-            raise click.UsageError(f"--say {option}: say {', '.join(words)}")
-        said[place] = words[word]
+        if word not in SAID:
+            raise click.UsageError(f"--say {option}: say {', '.join(SAID)}")
+        said[place] = SAID[word]
     return said
 
 

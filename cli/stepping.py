@@ -19,15 +19,16 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import partial
 from typing import Protocol, TypeAlias
 
 import click
 
-from firable.executor import Answer, Host, Operator
+from firable.executor import Host, Operator
 from firable.executor.operating.aside import UntoldError, aside
 from firable.executor.operating.restart import uncertain
+from firable.executor.protocol.commands import SAID
 
 _PROMPT = "  [Enter] next, [r] run on, [e] stop at the end of the cycle, [s] stop now: "
 _TAKE_UP = "  [r] take the run up, [s] stop now: "
@@ -241,8 +242,8 @@ def _operator(speed: float | None, say: Say) -> Operator:
             host.stop()
             return
         place, _, word = line.strip().partition("=")
-        with suppress(ValueError):  # no answer: then it is asked again
-            host.say(place, Answer(word.replace("-", " ")))
+        if word in SAID:  # or it is asked again
+            host.say(place, SAID[word])
 
     async def operate(host: Host) -> None:
         typed: _Typed = (_TypedAtPrompt if speed is None else _TypedMeanwhile)(say)

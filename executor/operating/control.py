@@ -41,12 +41,12 @@ from aiohttp.typedefs import Handler, Middleware
 
 from firable.executor.operating.own_certificate import fault_of, fault_of_authority, unloaded
 from firable.executor.operating.situation import Situation, State
-from firable.executor.protocol.commands import Answer
+from firable.executor.protocol.commands import SAID, Answer
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.source import printable
 
 METRICS_CONTENT_TYPE: Final = "text/plain; version=0.0.4; charset=utf-8"
-_SAID: Final = tuple(answer.value for answer in Answer if answer is not Answer.UNKNOWN)
+_SAID: Final = tuple(answer.value for answer in SAID.values())
 STRANGERS_MAX: Final = 100
 """So many lines of a trace tell of those who were not let in."""
 SHUTDOWN_SECONDS: Final = 1.0

@@ -47,6 +47,10 @@ class Answer(StrEnum):
     UNKNOWN = "unknown"
 
 
+SAID: Final = {answer.value.replace(" ", "-"): answer for answer in Answer if answer is not Answer.UNKNOWN}
+"""What an operator may say, by the word that is typed for it."""
+
+
 class Stage(StrEnum):
     """How far a command has come."""
 

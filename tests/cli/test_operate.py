@@ -196,6 +196,31 @@ def test_a_run_that_is_not_there_is_one_clear_error(tmp_path: Path, capsys: pyte
     assert "error[F1001]" in capsys.readouterr().err
 
 
+WORDS = "say what became of a command: say PLACE=done, =working or =not-received"
+
+
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        ("pause x=y", "pause takes nothing after it: leave out 'x=y'; PLACE=ANSWER is for say"),
+        ("stop now", "stop takes nothing after it: leave out 'now'"),
+        ("say", WORDS),
+        ("say robot.grasp", WORDS),
+        ("say =done", WORDS),
+        ("say robot.grasp=perhaps", WORDS),
+        ("say robot.grasp=unknown", WORDS),
+    ],
+)
+def test_a_command_that_is_told_what_it_does_not_take_asks_nobody(
+    command: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "token").write_text(new_token())
+    assert main(["operate", "http://127.0.0.1:9", *command.split(), "--token-file", str(tmp_path / "token")]) == 2
+    said = capsys.readouterr().err
+    assert f"Error: {told}" in said
+    assert "F5063" not in said, "that nobody serves there"
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
