@@ -94,7 +94,7 @@ def takeover(
         if len(journals) == 1:
             dealt = {file: (*deciding, *names) for file, names in controllers.items()}
         moved = take_over(before.decomposition, after.decomposition, kept, deciding)
-        _demand_reachable(after.net, moved.marking, budget(max_markings, max_memory, max_seconds))
+        _demand_reachable(before.net, after.net, moved.marking, budget(max_markings, max_memory, max_seconds))
         targets = dict(zip(journals, into, strict=True))
         written = {targets[file]: names for file, names in dealt.items() if names}
         with _removed_if_it_fails(written):
@@ -182,7 +182,7 @@ def _write(
             write_whole(file, data)
 
 
-def _demand_reachable(net: Net, marking: tuple[str, ...], allowed: Budget) -> None:
+def _demand_reachable(old: Net, net: Net, marking: tuple[str, ...], allowed: Budget) -> None:
     """Raise `InputError` F5051 unless the marking is one that the new net can reach."""
     from firable.nets.diagnostics import Diagnostic, InputError
     from firable.nets.verdict import Status
@@ -194,8 +194,13 @@ def _demand_reachable(net: Net, marking: tuple[str, ...], allowed: Budget) -> No
         raise InputError([Diagnostic("F5051", message, "give it more time or memory: --max-seconds, --max-memory")])
     if verdict.status is Status.VIOLATED:
         message = f"'{net.name}' never comes into the marking {shown}, so nothing is proved of what follows"
+        where = "best to the end of the cycle"
+        if new := [name for name in net.names(net.initial_marking) if name not in old.place_index]:
+            # What only the new net has gets no token from the old one.
+            message += f": {', '.join(new)}, which the old net has not, begins with a token and would have none"
+            where = f"in the new net with no token on {', '.join(new)}"
         hint = (
-            "run the old bundle on, to a marking that both nets reach: best to the end of the cycle; where there is "
+            f"run the old bundle on, to a marking that both nets reach: {where}; where there is "
             "none, bring the cell by hand to the initial marking of the new net, and begin with a new journal"
         )
         raise InputError([Diagnostic("F5051", message, hint)])

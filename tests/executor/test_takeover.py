@@ -241,8 +241,30 @@ def test_a_marking_that_the_new_net_never_reaches_is_refused_and_nothing_written
     old, new = bundles
     before, into = journal(tmp_path / "old.journal", old, {"robot.free", "table.full"}), tmp_path / "new.journal"
     assert main(["takeover", str(old), str(new), "--journal", str(before), "--into", str(into)]) == 2
-    assert "F5051" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "error[F5051]: 'cell' never comes into the marking robot.free, table.full, so nothing is proved of" in said
+    assert "which the old net has not" not in said
     assert not into.exists()
+
+
+def test_a_place_of_the_new_net_alone_that_begins_with_a_token_is_named_where_its_token_is_missing(
+    bundles: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with_light = OLD.replace("start: empty", "start: [empty, light]").replace(
+        "      full:\n", "      full:\n      light:\n"
+    )
+    with_light = with_light.replace("[robot.free, table.empty], to", "[robot.free, table.empty, table.light], to")
+    with_light = with_light.replace("to: [robot.free, table.empty]", "to: [robot.free, table.empty, table.light]")
+    old, new = bundles[0], bundle(tmp_path, "light", with_light)
+    capsys.readouterr()
+    before, into = journal(tmp_path / "old.journal", old, {"robot.free", "table.empty"}), tmp_path / "new.journal"
+    assert main(["takeover", str(old), str(new), "--journal", str(before), "--into", str(into)]) == 2
+    said = capsys.readouterr().err
+    assert "table.light, which the old net has not, begins with a token and would have none" in said
+    assert "a marking that both nets reach: in the new net with no token on table.light; where there is none" in said
+    assert not into.exists()
+    meanwhile = journal(tmp_path / "later.journal", old, {"robot.worked_out", "table.full"})
+    assert main(["takeover", str(old), str(new), "--journal", str(meanwhile), "--into", str(into)]) == 0
 
 
 def test_files_that_stand_in_the_way_or_are_missing_are_told_of(
