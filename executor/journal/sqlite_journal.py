@@ -234,9 +234,10 @@ def machines_of(path: Path | str) -> tuple[str, ...]:
 def _damaged(path: Path, what: str) -> NoReturn:
     message = f"{printable(str(path))}: the journal is damaged: {what}"
     name = printable(path.name)
+    files = f"{name}, {name}-wal, {name}.generation and {name}.cell"
     hint = (
         "what the cell did last is not known from it: look at the machines and bring the cell to its initial "
-        f"marking, then move {name}, {name}.generation and {name}.cell away (those there are), and start anew"
+        f"marking, then move {files} away (those there are), and start anew"
     )
     raise InputError([Diagnostic("F5032", message, hint)])
 

@@ -241,7 +241,8 @@ def test_damaged_journal_names_the_files_that_belong_to_it(tmp_path: Path) -> No
     (tmp_path / "cell.journal").write_text("dear diary, " * 1000)
     with pytest.raises(InputError) as caught:
         sqlite(tmp_path)
-    assert "move cell.journal, cell.journal.generation and cell.journal.cell away" in caught.value.diagnostics[0].hint
+    files = "cell.journal, cell.journal-wal, cell.journal.generation and cell.journal.cell"
+    assert f"move {files} away" in caught.value.diagnostics[0].hint
 
 
 def test_folder_that_is_not_there_is_told_in_the_words_of_the_system(tmp_path: Path) -> None:
