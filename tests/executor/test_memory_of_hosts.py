@@ -5,7 +5,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from support.hosts import ONE_EACH, Cell
+from support.hosts import CENTRE, ONE_EACH, ROBOT, Cell
 from support.two_hosts import SPLIT, Counting, Hosts, refusal
 
 from firable.decompose import split
@@ -22,7 +22,7 @@ from firable.executor.operating.recorder import HELD_BACK_MAX, Recorder, TraceFi
 from firable.executor.operating.situation import State
 from firable.nets.text import parse_net
 
-CENTRE, ROBOT, CONVEYOR = (COORDINATOR,), ("robot",), ("conveyor",)
+CONVEYOR = ("conveyor",)
 LAMP = """\
 firable: 1
 cell: cell

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
 from support.examples import examples
-from support.hosts import ONE_EACH, Cell
+from support.hosts import CENTRE, ONE_EACH, ROBOT, Cell
 from support.link_rigs import Heard
 from support.slow_disks import Slow
 from support.two_hosts import Hosts, refusal
@@ -26,8 +26,6 @@ from firable.executor.links.storages import Memory, Met, Storage
 from firable.executor.operating.acquaintances import Acquaintances
 from firable.executor.operating.recorder import KEY, TRACE, Recorder
 from firable.executor.protocol.messages import Hello, Keep
-
-CENTRE, ROBOT = (COORDINATOR,), ("robot",)
 
 
 @pytest.mark.parametrize("lost", ONE_EACH, ids=lambda machines: machines[0] or "coordinator")

@@ -22,6 +22,8 @@ from firable.semantics.joining import VOTED, join
 from firable.semantics.replaying import Replay, replay
 from firable.semantics.trace import Noted, read_trace
 
+CENTRE = (COORDINATOR,)
+ROBOT = ("robot",)
 ONE_EACH = ((COORDINATOR,), ("system",), ("robot",), ("mc",), ("conveyor",))
 TOGETHER = (("system", COORDINATOR), ("robot", "mc"), ("conveyor",))
 ALL_IN_ONE = ((COORDINATOR, "system", "robot", "mc", "conveyor"),)
