@@ -9,7 +9,7 @@ import click
 from firable.cli import text
 from firable.cli.log import told_aside
 from firable.cli.report import Report
-from firable.cli.watched import machines_verdict, show_coalesced
+from firable.cli.watched import AFTER_A_FAULT, machines_verdict, show_coalesced
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -75,7 +75,7 @@ def show_bound(report: Report) -> None:
     text.heading(report.net, report.input)
     done = report.run
     click.echo(f"  {done['state']} after {done['seconds']:,.0f} s on the machines of {done['binding']}")
-    if done["message"]:
+    if done["message"] and report.verdicts[0].holds:
         click.echo(f"  {done['message']}")
     if done["state"] == "stopped":
         for line in done["blocked"][:_BLOCKED_SHOWN]:
@@ -110,6 +110,6 @@ def _verdict(report: RunReport, bind: str) -> Verdict:
         "the cell runs until it is stopped",
         f"run on the machines of {bind}",
         bound=report.situation.message if unsettled else "",
-        hint=f"{report.state}: {report.situation.message}" if went_wrong else "",
-        subjects=tuple(map(str, report.situation.blocked)) if went_wrong else (),
+        hint=AFTER_A_FAULT if report.state is State.FAULT else "",
+        subjects=(*filter(None, [report.situation.message]), *map(str, report.situation.blocked)) if went_wrong else (),
     )

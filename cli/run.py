@@ -22,7 +22,7 @@ from firable.cli.sign import trust_option
 from firable.cli.watched import machines_verdict, show_coalesced
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from firable.executor import Answer, Operator, RunReport
     from firable.nets.bundle import Bundle
@@ -306,8 +306,7 @@ def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, .
             f"{workpieces} workpieces go through the cell",
             method,
             bound=f"{through} went through" if ended is Status.UNKNOWN else "",
-            hint=_why(report) if ended is Status.VIOLATED else "",
-            subjects=tuple(map(str, report.situation.blocked)) if ended is Status.VIOLATED else (),
+            subjects=(*_why(report), *map(str, report.situation.blocked)) if ended is Status.VIOLATED else (),
         ),
         Verdict(
             "workpieces-intact",
@@ -320,10 +319,11 @@ def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, .
     return (*verdicts, *machines_verdict(report, method))
 
 
-def _why(report: RunReport) -> str:
+def _why(report: RunReport) -> Iterator[str]:
     """Why the workpieces did not go through; what the verdict on the machines tells is not told twice."""
     found, message = report.divergence, report.situation.message
-    return message if found is None else message.replace(f": {found}", "; see machines-as-modelled")
+    if message:
+        yield message if found is None else message.replace(f": {found}", "; see machines-as-modelled")
 
 
 def _show(report: Report) -> None:

@@ -1,8 +1,8 @@
-"""What `firable run` says of the machines: whether they did what their model allows, and what came too fast."""
+"""What `firable run` says of the machines: what they did, what came too fast, and what to do after a fault."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import click
 
@@ -14,6 +14,12 @@ if TYPE_CHECKING:
     from firable.executor import RunReport
     from firable.executor.operating.hosting import HostReport
     from firable.nets.verdict import Verdict
+
+AFTER_A_FAULT: Final = (
+    "mend what it tells of, and give the same command again: with its --journal the run is taken up where it stood; "
+    "without one bring the cell to its initial marking first"
+)
+"""What to do after a run on machines that has ended by a fault."""
 
 
 def machines_verdict(report: RunReport | HostReport, method: str) -> tuple[Verdict, ...]:

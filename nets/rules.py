@@ -46,6 +46,7 @@ _OF_A_RUN: Final[Mapping[str, str]] = {
     "workpieces-carried-through": "F5007",
     "workpieces-intact": "F5007",
     "ran-until-stopped": "F5007",
+    "host-ended-in-order": "F5007",
     "machines": "F5008",
     "machines-as-modelled": "F5008",
     "rehearsal": "F4006",

@@ -13,16 +13,20 @@ import pytest
 from support.cells import decomposition_of, plant_of
 from support.waiting import PATIENCE_SECONDS, heard_in_time, until
 
+from firable.cli import bound_run, hosting
 from firable.cli.bound_run import run_bound_of
 from firable.cli.main import main
 from firable.cli.run import _verdicts
-from firable.executor import execute
+from firable.executor import RunReport, execute
 from firable.executor.cell.disturbances import NeverCompletes
 from firable.executor.drivers import binding
 from firable.executor.operating import running
 from firable.executor.operating.running import Watch
+from firable.executor.operating.situation import Situation, State
 from firable.nets.bundle import read_bundle
 from firable.nets.catalogue import catalogue_net, catalogue_path
+from firable.nets.rules import hints_of
+from firable.nets.verdict import Status
 from firable.semantics.joining import VOTED
 from firable.semantics.replaying import replay
 from firable.semantics.trace import Noted, read_trace
@@ -326,8 +330,23 @@ def test_a_run_that_is_stopped_at_a_divergence_tells_it_once() -> None:
     )
     assert report.divergence is not None
     through, _, machines = _verdicts(report, 3, 0)
-    assert through.hint == "the machines are not as they are modelled; see machines-as-modelled"
+    assert through.subjects[0] == "the machines are not as they are modelled; see machines-as-modelled"
+    assert not through.hint, "what to do is said of every such verdict"
     assert report.divergence.message in machines.hint
+
+
+def test_the_end_of_a_run_by_a_fault_tells_the_fault_once_and_what_to_do() -> None:
+    fault = "'R MOVE' of 'robot.to_cv1', sent at 1.0 s, is overdue: 'robot.at_cv1' has not come within 120 s"
+    situation = Situation(State.FAULT, (), message=fault)
+    report = RunReport(situation, (), (), (), (), {}, 0, 0, {}, 1.0)
+    simulated = _verdicts(report, 1, 0)[0]
+    for one in (simulated, bound_run._verdict(report, "cell.bind.yaml"), hosting._verdict(situation, ("robot",))):
+        assert one.status is Status.VIOLATED
+        assert one.subjects == (fault,)
+        ((code, hint),) = hints_of(one)
+        assert code == "F5007"
+        assert fault not in hint
+        assert ("--trace FILE" if one is simulated else "with its --journal the run is taken up") in hint
 
 
 def test_the_report_of_machines_that_are_not_as_they_are_modelled_is_as_its_schema_says(

@@ -39,6 +39,7 @@ RULES = {
     "workpieces-carried-through": "F5007",
     "workpieces-intact": "F5007",
     "ran-until-stopped": "F5007",
+    "host-ended-in-order": "F5007",
     "machines": "F5008",
     "machines-as-modelled": "F5008",
     "eq7.G1": "F4002",
