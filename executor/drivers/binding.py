@@ -82,6 +82,11 @@ class ChannelDocument(_Model):
     done: Name | None = None
     failed: Name | None = None
 
+    @property
+    def asks(self) -> Point:
+        """The point by which a command is given."""
+        return str(self.number or self.command or self.request)
+
 
 class DeviceDocument(_Model):
     """One device: its kind, its channels, its safe outputs; the other keys are of its kind."""

@@ -94,8 +94,9 @@ class BoundDriver:
 
     @property
     def unreached(self) -> tuple[str, ...]:
-        """The devices to which there is no connection now, or that have never shown a signal, in a phrase each."""
-        return tuple(phrase for device in self.devices.values() if (phrase := device.unreached or device.unshown))
+        """In a phrase each, the devices that are not connected, have never shown a signal, or not taken a command."""
+        of_each = ((one.unreached,) if one.unreached else (one.unshown, one.untaken) for one in self.devices.values())
+        return tuple(phrase for phrases in of_each for phrase in phrases if phrase)
 
     def readings(self) -> Mapping[str, Reading]:
         """The process image."""

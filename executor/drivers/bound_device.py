@@ -14,7 +14,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Final
 
 from firable.executor.drivers.binding import CommandDocument, SignalDocument, writes
-from firable.executor.drivers.channels import Channel, Outcome, Said
+from firable.executor.drivers.channels import Channel, Order, Outcome, Said
 from firable.executor.drivers.device import Point, Value, Writes, as_bit
 from firable.executor.drivers.driver import Quality, Reading
 from firable.executor.drivers.emergency import Contacts
@@ -28,6 +28,12 @@ if TYPE_CHECKING:
 
 LOOK_SECONDS: Final = 0.01
 """How often it is looked whether a device shows something of a command."""
+
+ANSWERS: Final = 3
+"""So many times as long as an answer may take is waited until it is told that a device has not taken a command."""
+
+_POINTS: Final = "are the points written as the device has them?"
+"""What is asked where a device is silent: a topic that is written wrong is no error to a broker."""
 
 
 class BoundDevice:
@@ -73,6 +79,10 @@ class BoundDevice:
         """When all signals should have been shown."""
         self.is_overdue = False
         """Whether they should have been by now."""
+        self.patience: dict[Channel | Handshake, asyncio.TimerHandle] = {}
+        """When the device should show that it has taken what was written to a channel last."""
+        self.late: dict[Channel | Handshake, Order] = {}
+        """What it has not shown to have taken by then, of each channel the newest."""
         self.noted = ""
         self.garbage: dict[Point, Value] = {}
         points = {*self.image.reads, *self.image.counters, *self.replies}
@@ -88,7 +98,7 @@ class BoundDevice:
         try:
             await self.kept.run()
         finally:
-            for alarm in (self.alarm, self.due, begun):
+            for alarm in (self.alarm, self.due, begun, *self.patience.values()):
                 if alarm is not None:
                     alarm.cancel()
 
@@ -153,6 +163,12 @@ class BoundDevice:
         where = ", ".join(f"'{name}' (at {self.image.signals[name].read})" for name in sorted(unread))
         return f"{self.name} has never shown {where}"
 
+    @property
+    def untaken(self) -> str:
+        """What it should have taken by now and has not, with the points; empty where there is nothing."""
+        late = [_given(one, order) for one, order in self.late.items() if one.unanswered is order]
+        return f"{self.name} has not taken {', '.join(late)}" if late else ""
+
     def against(self) -> Iterator[str]:
         """What keeps its driver latched, in a phrase each."""
         if not self.is_ready.is_set():
@@ -208,7 +224,15 @@ class BoundDevice:
         """Tell what was never shown: where a device tells unasked, a point that is written wrong is not noticed."""
         self.is_overdue = True
         if self.unshown:
-            self.note(f"{self.unshown.removeprefix(self.name + ' ')}: are the points written as the device has them?")
+            self.note(f"{self.unshown.removeprefix(self.name + ' ')}: {_POINTS}")
+
+    def _should_have_taken(self, channel: Channel | Handshake) -> None:
+        """Tell what the device does not show to have taken: else nobody knows before the command is overdue."""
+        order = channel.unanswered
+        if order is None or order is self.late.get(channel) or self.unreached or self.driver.is_stopped:
+            return
+        self.late[channel] = order
+        self.note(f"has not taken {_given(channel, order)}: {_POINTS}")
 
     def lost(self, why: str) -> None:
         """There is no connection, or none any more."""
@@ -243,11 +267,20 @@ class BoundDevice:
 
     def written(self) -> None:
         """The device has confirmed that."""
-        if self.writing is None:
+        if (channel := self.writing) is None:
             self.forced.popleft()
         else:
-            for outcome in self.writing.written():
+            for outcome in channel.written():
                 self._said(outcome)
+            self._await_taking(channel)
+
+    def _await_taking(self, channel: Channel | Handshake) -> None:
+        """Wait from now on until the device shows that it has what was written."""
+        if (earlier := self.patience.pop(channel, None)) is not None:
+            earlier.cancel()
+        if channel.unanswered is not None:
+            after_s = ANSWERS * self.document.timeout_s
+            self.patience[channel] = asyncio.get_running_loop().call_later(after_s, self._should_have_taken, channel)
 
     # What follows from it
 
@@ -324,3 +357,9 @@ class BoundDevice:
         elif tripped and self.has_tripped is None:
             self.note("its watchdog had stopped its machines when this run began")
         self.has_tripped = tripped
+
+
+def _given(channel: Channel | Handshake, order: Order) -> str:
+    """An order, and where it was written and would be shown."""
+    shown = ", ".join(channel.points())
+    return f"'{order.text}' of '{order.place}' (written at {channel.document.asks}, shown at {shown})"

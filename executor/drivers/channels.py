@@ -102,6 +102,12 @@ class Channel:
         """Whether a command has not been written yet."""
         return bool(self.waiting) or (self.current is not None and self.phase is not _Phase.WRITTEN)
 
+    @property
+    def unanswered(self) -> Order | None:
+        """The newest order, where the device has confirmed what was written and should show by now that it has it."""
+        awaits = self.phase is _Phase.WRITTEN and not self.is_taken and self.document.taken is not None
+        return self.current if awaits or self.phase is _Phase.CLEARING else None
+
     def number(self, place: str, entry: int) -> int:
         """The number of a command: 1 + (entry * n + i) mod m, for place i of n and the largest m of whole rounds.
 

@@ -121,7 +121,7 @@ class Driver(Protocol):
 
     @property
     def unreached(self) -> Collection[str]:
-        """The devices to which there is no connection now, or that have never shown a signal, in a phrase each."""
+        """In a phrase each, the devices that are not connected, have never shown a signal, or not taken a command."""
         ...
 
     def readings(self) -> Mapping[str, Reading]:

@@ -64,6 +64,13 @@ class Handshake:
         """Whether a command has not been written yet."""
         return bool(self.waiting) or (self.current is not None and self.phase in {_Phase.HELD, _Phase.ASKING})
 
+    @property
+    def unanswered(self) -> Order | None:
+        """The newest order, where the device should show by now that it has it, or has never shown all of its bits."""
+        awaits = self.phase is _Phase.ASKED and not self.is_taken and self.document.taken is not None
+        is_blind = self.phase is _Phase.HELD and any(self.shown.get(key) is None for key in self.points().values())
+        return self.current if awaits or is_blind else None
+
     def points(self) -> dict[Point, str]:
         """The points that are read, and of what."""
         keys = {"taken": self.document.taken, "done": self.document.done, "failed": self.document.failed}
@@ -95,10 +102,10 @@ class Handshake:
             return None
         if self.phase in {_Phase.OVER, _Phase.HELD} and self.request is not False:
             self.writing = False
-            return ((str(self.document.request), False),)
+            return ((self.document.asks, False),)
         if self.phase is _Phase.ASKING or (self.phase is _Phase.HELD and self._is_idle()):
             self.phase, self.writing = _Phase.ASKING, True
-            return (*self.current.writes, (str(self.document.request), True))
+            return (*self.current.writes, (self.document.asks, True))
         return None
 
     def written(self) -> tuple[Outcome, ...]:

@@ -54,13 +54,13 @@ class Dispatch:
         run = self.run
         sender = run.net.place(place)
         if sender.completion is not None:
-            self.watch(place)
+            self.watch(place, entry)
             run.driver.send(sender, entry)
             return
         self.untaken.add(place)
         run.driver.send(sender, entry)
         if place in self.untaken:  # it waits for a line
-            self.watch(place)
+            self.watch(place, entry)
 
     def taken(self, place: str, entry: int) -> None:
         """A machine has the command of a place; a token without completion has waited for that."""
@@ -88,14 +88,14 @@ class Dispatch:
             for name in withdraw(self.run.driver, places, self.run.acts.outbox):
                 self.run.recorder.note(self.run.now_seconds(), "withdrawn", place=name)
 
-    def watch(self, place: str) -> None:
+    def watch(self, place: str, entry: int) -> None:
         """Await the end of a place's command from now on."""
         sender, clock = self.run.net.place(place), self.run.clock
         if sender.within is None and clock is not None:
             awaited = sender.completion or place
             self.over(awaited)
             delay = self.overdue_seconds / clock.speed
-            self.timers[awaited] = clock.loop.call_later(delay, self._overdue, place, clock.now_seconds())
+            self.timers[awaited] = clock.loop.call_later(delay, self._overdue, place, entry, clock.now_seconds())
 
     def over(self, awaited: str) -> None:
         """Await a completion, or the command of a place, no more."""
@@ -107,10 +107,13 @@ class Dispatch:
         for timer in self.timers.values():
             timer.cancel()
 
-    def _overdue(self, place: str, sent_at: float) -> None:
+    def _overdue(self, place: str, entry: int, sent_at: float) -> None:
         sender = self.run.net.place(place)
         self.timers.pop(sender.completion or place, None)
-        awaited = f"'{sender.completion}' has not come" if sender.completion else "its machine has not taken it"
+        awaited = "its machine has not shown that it took it"
+        if sender.completion is not None:
+            taken = "it counts as taken" if was_taken(self.run.journal, place, entry) else awaited
+            awaited = f"{taken}, and '{sender.completion}' has not come"
         self.run.fail(
             f"'{sender.command}' of '{place}', sent at {sent_at:.1f} s, is overdue: "
             f"{awaited} within {self.overdue_seconds:g} s"

@@ -290,7 +290,7 @@ class Host:
         if answer in (Answer.WORKING, Answer.NOT_RECEIVED):
             self.dispatch.keep_taken(place, entry if answer is Answer.WORKING else None)
         if answer is Answer.WORKING:
-            self.dispatch.watch(place)
+            self.dispatch.watch(place, entry)
 
     async def quiet(self) -> None:
         """Wait until nothing is posted, or the run is over."""

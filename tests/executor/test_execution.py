@@ -137,7 +137,7 @@ def test_command_that_never_completes_is_a_fault_and_not_a_deadlock() -> None:
     report, _ = run_cell("one_robot", 5, disturbances=[NeverCompletes("MC", "CLAMP", 2)], overdue_seconds=60.0)
     assert report.state is State.FAULT
     assert report.situation.message.startswith("'MC CLAMP' of 'mc.fix', sent at ")
-    assert "'mc.clamped' has not come within 60 s" in report.situation.message
+    assert "is overdue: it counts as taken, and 'mc.clamped' has not come within 60 s" in report.situation.message
     assert {gate for blocked in report.situation.blocked for gate in blocked.gates} >= {("mc.clamped", True)}
     assert len(report.delivered) == 1
 

@@ -127,7 +127,7 @@ def test_command_that_no_machine_takes_is_overdue(make: Make) -> None:
         ended = await make(Queue(), MemoryJournal()).main()
         assert ended.state is State.FAULT
         assert "'A OPEN' of 'a.lamp'" in ended.message
-        assert "its machine has not taken it within 30 s" in ended.message
+        assert "its machine has not shown that it took it within 30 s" in ended.message
 
     run_in_virtual_time(main())
 

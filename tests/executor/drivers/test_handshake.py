@@ -157,3 +157,34 @@ def test_after_a_restart_only_a_machine_at_work_says_something(
     assert one.answer(place, 3, stopped=stopped) is answer
     told = said(one, "done", 1)
     assert told == ([(place, Said.DONE)] if answer is Answer.WORKING else [])
+
+
+def names(one: Handshake) -> bool:
+    """Whether it names its newest order as one that the device does not show to have."""
+    return one.unanswered is not None and one.unanswered is one.current
+
+
+def test_command_that_the_device_does_not_show_to_have_is_named_until_it_does() -> None:
+    one = bits()
+    one.send("a", 1, "", ())
+    put(one)
+    assert not names(one)  # only that nothing is asked for is written yet
+    put(one)
+    assert names(one)
+    said(one, "taken", 1)
+    assert not names(one)
+    slow = bits(taken=False)  # which shows nothing before it is done
+    slow.send("a", 1, "", ())
+    put(slow)
+    put(slow)
+    assert not names(slow)
+
+
+def test_command_that_waits_for_a_bit_that_was_never_shown_is_named() -> None:
+    one = Handshake(ChannelDocument(request="q", taken="t", done="d"), ["a"], frozenset("a"))
+    one.shows("taken", 0)
+    one.send("a", 1, "", ())
+    put(one)
+    assert names(one)
+    one.shows("done", 1)  # of the command before, which is to be over first
+    assert not names(one)

@@ -128,6 +128,30 @@ def test_number_that_the_device_shows_already_is_cleared_before_it_is_sent() -> 
     assert [(told.said, told.order.entry) for told in one.shows("done", number)] == [(Said.TAKEN, 1), (Said.DONE, 1)]
 
 
+def names(one: Channel) -> bool:
+    """Whether it names its newest order as one that the device does not show to have."""
+    return one.unanswered is not None and one.unanswered is one.current
+
+
+def test_order_that_the_device_does_not_show_to_have_is_named_until_it_does() -> None:
+    one = channel("a", answered="a")
+    number = one.number("a", 1)
+    one.send("a", 1, "", ())
+    after(one, taken=number, done=0)
+    assert names(one)  # its number is to be cleared first
+    after(one, taken=0)
+    assert not names(one)  # written, and not confirmed
+    one.written()
+    assert names(one)
+    one.shows("taken", number)
+    assert not names(one)
+    blind = channel("a", answered="a", taken=False)
+    blind.send("a", 1, "", ())
+    after(blind, done=0)
+    blind.written()
+    assert not names(blind)  # it shows nothing before it is done
+
+
 def test_write_that_failed_is_repeated_with_its_number_unless_the_device_has_it() -> None:
     for is_there in (False, True):
         one = channel("a", answered="a")
