@@ -81,8 +81,9 @@ def show_bound(report: Report) -> None:
         for line in done["blocked"][:_BLOCKED_SHOWN]:
             click.echo(f"    {line}")
     click.echo(
-        f"  {text.counted(sum(done['firings'].values()), 'firing')}, {text.counted(done['commands'], 'command')} to "
-        f"machines, {text.counted(done['messages'], 'message')} between coordinator and controllers"
+        f"  {text.counted(sum(done['firings'].values()), 'firing')}, "
+        f"{text.counted(done['commands'], 'command')} issued, "
+        f"{text.counted(done['messages'], 'message')} between coordinator and controllers"
     )
     show_coalesced(done["coalesced"])
     if refuted := [verdict for verdict in report.verdicts if not verdict.holds]:

@@ -345,8 +345,8 @@ def _show(report: Report) -> None:
     several = len(done["decided"]) > 1
     between = f"between {'coordinators' if several else 'coordinator'} and controllers"
     click.echo(
-        f"  {text.counted(sum(done['firings'].values()), 'firing')}, {text.counted(done['commands'], 'command')} to "
-        f"machines, {text.counted(done['messages'], 'message')} {between}"
+        f"  {text.counted(sum(done['firings'].values()), 'firing')}, "
+        f"{text.counted(done['commands'], 'command')} issued, {text.counted(done['messages'], 'message')} {between}"
     )
     if several:
         told = ", ".join(f"{count:,} by {name}" for name, count in done["decided"].items())

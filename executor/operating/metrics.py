@@ -59,7 +59,7 @@ class Metrics:
         self.held = Summary("firable_place_seconds", "How long a token stayed on a place", ["place"], registry=registry)
         self.marked = Gauge("firable_marked", "1 while a place holds a token", ["place"], registry=registry)
         self.commands = Counter(
-            "firable_commands", "Commands sent to a machine", ["machine", "command", "place"], registry=registry
+            "firable_commands", "Commands issued to a machine", ["machine", "command", "place"], registry=registry
         )
         self.completions = Summary(
             "firable_command_seconds",

@@ -61,6 +61,7 @@ class RunReport:
     doubled: tuple[int, ...]
     firings: Mapping[str, int]
     commands: int
+    """How many commands the controllers issued, as the trace has them, whether or not machines took them."""
     messages: int
     decided: Mapping[str, int]
     """How many transitions each coordinator has committed."""

@@ -155,6 +155,40 @@ def test_bundle_runs_on_the_machines_of_a_binding_until_it_is_stopped(cell: Cell
     assert replay(NET, read_trace(trace)).complete
 
 
+ARM = """
+firable: 1
+cell: arm
+controllers:
+  a:
+    start: home
+    inputs: [key]
+    places: {home: , away: {send: {machine: A, command: MOVE}, until: there}}
+transitions:
+  go:   {from: a.home, to: a.away}
+  back: {from: a.away, to: a.home, unless: a.key}
+"""
+FAR = """
+firable_bind: 1
+cell: arm
+devices:
+  far: {driver: serial, port: /dev/nobody-is-here, start_s: 0.5, channels: {A: {command: out, taken: in, done: ok}}}
+signals: {a.there: acknowledged, a.key: {device: far, read: key}}
+commands: {a.away: {device: far, channel: A}}
+"""
+
+
+def test_commands_of_a_device_that_was_never_reached_are_counted_as_issued_and_no_more(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "arm.firable.yaml").write_text(ARM)
+    (tmp_path / "arm.bind.yaml").write_text(FAR)
+    assert main(["bundle", str(tmp_path / "arm.firable.yaml"), "-o", str(tmp_path / "arm.bundle")]) == 0
+    assert main(["run", str(tmp_path / "arm.bundle"), "--bind", str(tmp_path / "arm.bind.yaml")]) == 1
+    said = capsys.readouterr().out
+    assert "'a.key' cannot be read: not reached since the start" in said
+    assert "1 firing, 1 command issued, " in said
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

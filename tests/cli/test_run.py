@@ -230,7 +230,7 @@ def test_a_run_that_was_killed_is_held_until_the_operator_takes_it_up(bundle: st
     held = typed("", bundle, *options)
     assert held.returncode == 3
     assert "nothing moves until it is resumed" in held.stdout
-    assert "0 commands to machines" in held.stdout
+    assert "0 commands issued" in held.stdout
     left = typed("s\n", bundle, *options, "--step", "--format", "json")
     assert "nothing moves until it is resumed" in left.stderr
     assert json.loads(left.stdout)["reports"][0]["run"]["state"] == "stopped"
