@@ -23,6 +23,7 @@ from firable.executor.drivers.device import (
 )
 from firable.executor.drivers.modbus_connection import ModbusConnection
 from firable.executor.drivers.modbus_points import WRITTEN, address
+from firable.executor.reasons import port_reason
 
 if TYPE_CHECKING:
     from firable.executor.drivers.modbus_connection import Client
@@ -115,13 +116,24 @@ class ModbusRtu(_Modbus):
             raise LinkError(f"{options.port} cannot be set to these options: {error}") from None
 
 
+def _port_refused(port: str) -> str:
+    """Why a port could not be opened: pymodbus tells nobody."""
+    from serial import Serial
+
+    try:
+        Serial(port, exclusive=True).close()
+    except OSError as error:
+        return f"{port}: {port_reason(error)}"
+    return f"{port} does not answer"
+
+
 async def _opened(
     client: Client, where: str, options: TcpOptions | RtuOptions, wanted: Wanted, *, is_line: bool
 ) -> Connection:
     quiet("pymodbus")
     try:
         if not await client.connect():
-            raise LinkError(f"{where} does not answer")
+            raise LinkError(_port_refused(where) if is_line else f"{where} does not answer")
         if is_to_itself(client.ctx.transport):
             raise LinkError(f"{where} does not answer: the connection leads to itself")
     except BaseException:

@@ -34,6 +34,7 @@ from firable.executor.drivers.device import (
     Wanted,
     Writes,
 )
+from firable.executor.reasons import port_reason
 
 if TYPE_CHECKING:
     from serial import Serial
@@ -236,7 +237,7 @@ class SerialLine:
         try:
             port = Serial(options.port, options.baud, timeout=0, write_timeout=0, exclusive=True)
         except (SerialException, ValueError) as error:
-            raise LinkError(str(error)) from None
+            raise LinkError(f"{options.port}: {port_reason(error)}") from None
         port.reset_input_buffer()
         return SerialConnection(Lines(port), wanted, options.every_s)
 

@@ -18,7 +18,6 @@ half-duplex converter does not have, and save only the time of empty polls.
 from __future__ import annotations
 
 import asyncio
-import errno
 import os
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -35,6 +34,7 @@ from firable.executor.links.link import Greeting, LinkListener, cannot_open, com
 from firable.executor.links.standing import Standing
 from firable.executor.links.storages import Memory, Met, Storage
 from firable.executor.protocol.messages import Message
+from firable.executor.reasons import port_reason
 from firable.nets.interchange import canonical_json
 
 MASTER: Final = 0
@@ -135,7 +135,7 @@ class SerialLink:
         try:
             self.line = serial.Serial(self.port, self.baud, timeout=0, write_timeout=0, exclusive=True)
         except (OSError, ValueError) as error:  # pyserial's own error is an OSError
-            raise cannot_open(self.port, _reason(error)) from None
+            raise cannot_open(self.port, port_reason(error)) from None
         descriptor = self.line.fileno()
         # It may have run before: whoever was heard then is met anew, and meets somebody else.
         self.instance, self.reader, self.polled = os.urandom(8).hex(), FrameReader(), -1
@@ -361,7 +361,7 @@ class SerialLink:
         try:
             act()
         except OSError as error:
-            self._break(has_failed(self.port, _reason(error)))
+            self._break(has_failed(self.port, port_reason(error)))
         except Exception as error:
             self._break(error)
 
@@ -382,14 +382,6 @@ def addresses_on_a_line(coordinators: tuple[str, ...], controllers: tuple[str, .
     {'': 0, 'system': 1, 'robot': 2}
     """
     return {**dict.fromkeys(coordinators, MASTER), **{name: i for i, name in enumerate(controllers, 1)}}
-
-
-def _reason(error: OSError | ValueError) -> str:
-    """Why a port cannot be had, in the words of the system; pyserial says them twice, and the port besides."""
-    number = error.errno if isinstance(error, OSError) else None
-    if number in {errno.EAGAIN, errno.EBUSY}:
-        return "another program has it open"
-    return os.strerror(number) if number else str(error)
 
 
 def _line(sender: str, receiver: str, text: bytes) -> bytes:

@@ -25,9 +25,7 @@ a server process of its own (uvicorn), which takes the signals of the process, C
 
 from __future__ import annotations
 
-import errno
 import ipaddress
-import os
 import secrets
 import ssl
 import time
@@ -42,6 +40,7 @@ from aiohttp.typedefs import Handler, Middleware
 from firable.executor.operating.own_certificate import fault_of, fault_of_authority, unloaded
 from firable.executor.operating.situation import Situation, State
 from firable.executor.protocol.commands import SAID, Answer
+from firable.executor.reasons import reason
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.source import printable
 
@@ -163,19 +162,13 @@ async def listening(app: web.Application, endpoint: Endpoint) -> AsyncIterator[s
         try:
             await site.start()
         except OSError as error:
-            message = f"the operator's endpoint cannot be had at {endpoint.host}:{endpoint.port}: {_reason(error)}"
+            message = f"the operator's endpoint cannot be had at {endpoint.host}:{endpoint.port}: {reason(error)}"
             raise InputError([Diagnostic("F5061", message, "name another port; 0 takes a free one")]) from None
         host, port = runner.addresses[0][:2]
         shown = f"[{host}]" if ":" in host else host
         yield f"{'http' if endpoint.tls is None else 'https'}://{shown}:{port}"
     finally:
         await runner.cleanup()
-
-
-def _reason(error: OSError) -> str:
-    """Why, in the words of the system; asyncio says the address in them once more."""
-    number = error.errno or 0
-    return os.strerror(number) if number in errno.errorcode else str(error.strerror or error)
 
 
 def admission(

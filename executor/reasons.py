@@ -1,0 +1,28 @@
+"""Why the system refuses something, in its words: libraries say them twice, with a number, and with the address."""
+
+from __future__ import annotations
+
+import errno
+import os
+import socket
+import ssl
+
+
+def reason(error: Exception) -> str:
+    """Why the system has refused something.
+
+    >>> reason(ConnectionRefusedError(errno.ECONNREFUSED, "Connect call failed ('127.0.0.1', 4840)"))
+    'Connection refused'
+    """
+    if not isinstance(error, OSError):
+        return str(error)
+    number = error.errno or 0
+    if number in errno.errorcode and not isinstance(error, ssl.SSLError | socket.gaierror):  # which number their own
+        return os.strerror(number)
+    return str(error.strerror or error)
+
+
+def port_reason(error: Exception) -> str:
+    """Why a serial port cannot be had; one that another program has is locked by it."""
+    is_taken = isinstance(error, OSError) and error.errno in {errno.EAGAIN, errno.EBUSY}
+    return "another program has it open" if is_taken else reason(error)
