@@ -14,6 +14,7 @@ import re
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic_core import PydanticCustomError
 
 from firable.nets.time_limits import TIME_PATTERN
 
@@ -214,7 +215,8 @@ class PropertyDocument(StrictDocument):
     def _one_pattern(self) -> PropertyDocument:
         count = sum(getattr(self, pattern) is not None for pattern in (*PATTERNS, *LOGICS))
         if count != 1:
-            raise ValueError(f"one of {', '.join((*PATTERNS, *LOGICS))} is wanted, {count or 'none'} given")
+            said = f"one of {', '.join((*PATTERNS, *LOGICS))} is wanted, {count or 'none'} given"
+            raise PydanticCustomError("refused", said, {"hint": "write one pattern for each property"})
         return self
 
 

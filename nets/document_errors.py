@@ -149,11 +149,9 @@ def _problem(
             f"add `{path[-1]}:`",
             span=node_span(source, owner[0] or owner[1]),
         )
-    if kind == "value_error":  # the pattern of a property
-        return Diagnostic(
-            "F1010", str(context.get("error", message)) + _inside(path), "write one pattern for each property",
-            span=node_span(source, key or node),
-        )  # fmt: skip
+    if kind in {"refused", "value_error"}:  # what a model says itself; with a hint the first, and the second of others
+        said = str(context.get("error", message)) + _inside(path)
+        return Diagnostic("F1010", said, str(context.get("hint", "")), span=node_span(source, key or node))
     if path[-1:] == ("[key]",):
         return Diagnostic(
             "F2012", "an empty name", "write a name before the colon", span=node_span(source, key or node)

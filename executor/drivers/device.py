@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Annotated, Any, Final, Protocol, runtime_checkable
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationInfo
+from pydantic_core import PydanticCustomError
 
 Point = str
 """The address of something that a device shows or takes, as the binding writes it."""
@@ -66,6 +67,17 @@ def _beside(path: str, info: ValidationInfo) -> Beside:
 
 File = Annotated[str, AfterValidator(_beside)]
 """The type of an option that names a file: a certificate, a key. One that cannot be read is refused with its line."""
+
+
+def _of_a_user(password: str | None, info: ValidationInfo) -> str | None:
+    """A password, which is shown with its user or not at all."""
+    if password is not None and "user" in info.data and info.data["user"] is None:
+        raise PydanticCustomError("refused", "a password without a user", {"hint": "write `user: NAME` beside it"})
+    return password
+
+
+Password = Annotated[str | None, AfterValidator(_of_a_user)]
+"""The type of an option `password`, behind an option `user`."""
 
 
 class Options(BaseModel):
@@ -221,6 +233,18 @@ class DeviceKind(Protocol):
     async def connect(self, options: Any, wanted: Wanted) -> Connection:
         """Make a new connection; raises `LinkError` or `OSError`."""
         ...
+
+
+def not_let_in(where: str, user: str | None, password: str | None) -> LinkError:
+    """That a device does not let in whoever shows this; the password itself is told to nobody.
+
+    >>> print(not_let_in("10.0.0.1:1883", "cell", "secret"))
+    10.0.0.1:1883 does not let the user 'cell' in: is the password right?
+    """
+    if user is None:
+        return LinkError(f"{where} does not let this host in, which gives no user")
+    shown = "is the password right?" if password is not None else "no password is given"
+    return LinkError(f"{where} does not let the user '{user}' in: {shown}")
 
 
 def quiet(library: str) -> None:

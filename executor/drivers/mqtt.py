@@ -14,6 +14,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
+import re
 import socket
 import uuid
 from collections.abc import Sequence
@@ -29,17 +30,25 @@ from firable.executor.drivers.device import (
     File,
     LinkError,
     Options,
+    Password,
     Point,
     Stepwise,
     Use,
     Value,
     Wanted,
     Writes,
+    not_let_in,
     quiet,
 )
 
 if TYPE_CHECKING:
-    from aiomqtt import Client
+    from aiomqtt import Client, MqttError
+
+_NUMBER: Final = re.compile(r"^\[(code:|Errno )-?\d+\] ")
+
+
+NOT_LET_IN: Final = frozenset({134, 135})
+"""How a broker says that a user's password is wrong, or that somebody may not connect."""
 
 
 class MqttTls(BaseModel):
@@ -57,7 +66,7 @@ class MqttOptions(Options):
     host: str
     port: int = Field(default=1883, ge=1, le=65_535)
     user: str | None = None
-    password: str | None = None
+    password: Password = None
     tls: bool | MqttTls = False
 
 
@@ -92,7 +101,7 @@ class MqttConnection(Stepwise):
                 text = payload.decode("utf-8", "replace") if isinstance(payload, (bytes, bytearray)) else str(payload)
                 batch.append((message.topic.value, text))
         except MqttError as error:
-            raise LinkError(str(error)) from None
+            raise LinkError(_why(error)) from None
         return batch
 
     async def write(self, writes: Writes) -> None:
@@ -106,7 +115,7 @@ class MqttConnection(Stepwise):
                 with self.step(f"'{topic}'", withheld):
                     await self.client.publish(topic, payload, qos=1, timeout=self.wanted.timeout_s)
             except MqttError as error:
-                raise LinkError(f"'{topic}': {error}") from None
+                raise LinkError(f"'{topic}': {_why(error)}") from None
 
     async def close(self) -> None:
         """Say goodbye if that can be, and end the connection in any case."""
@@ -124,6 +133,11 @@ class MqttConnection(Stepwise):
                 with suppress(MqttError):  # when it has seen that
                     while await anext(self.client.messages):
                         pass
+
+
+def _why(error: MqttError) -> str:
+    """What has failed, without the number that stands before it."""
+    return _NUMBER.sub("", str(error))
 
 
 class Mqtt:
@@ -144,7 +158,7 @@ class Mqtt:
 
     async def connect(self, options: MqttOptions, wanted: Wanted) -> Connection:
         """Make a new client."""
-        from aiomqtt import Client, MqttError, TLSParameters
+        from aiomqtt import Client, MqttCodeError, MqttError, TLSParameters
 
         quiet("firable.mqtt")
         tls = TLSParameters() if options.tls else None
@@ -166,7 +180,10 @@ class Mqtt:
             await connection.open()
         except MqttError as error:
             await connection.close()
-            raise LinkError(f"{options.host}:{options.port}: {error}") from None
+            where = f"{options.host}:{options.port}"
+            if isinstance(error, MqttCodeError) and getattr(error.rc, "value", error.rc) in NOT_LET_IN:
+                raise not_let_in(where, options.user, options.password) from None
+            raise LinkError(f"{where}: {_why(error)}") from None
         except BaseException:
             await connection.close()
             raise

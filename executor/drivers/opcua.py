@@ -25,6 +25,7 @@ from firable.executor.drivers.device import (
     File,
     LinkError,
     Options,
+    Password,
     Point,
     Stepwise,
     Use,
@@ -32,8 +33,10 @@ from firable.executor.drivers.device import (
     Wanted,
     Writes,
     drop_at_close,
+    not_let_in,
     quiet,
 )
+from firable.executor.reasons import reason
 
 if TYPE_CHECKING:
     from asyncua.client.client import Client
@@ -68,7 +71,7 @@ class OpcUaOptions(Options):
     url: str
     every_s: float = Field(default=0.01, gt=0, le=60, allow_inf_nan=False)
     user: str | None = None
-    password: str | None = None
+    password: Password = None
     security: OpcUaSecurity | None = None
 
 
@@ -216,7 +219,7 @@ class OpcUa:
     async def connect(self, options: OpcUaOptions, wanted: Wanted) -> Connection:
         """Make a new client."""
         from asyncua.client.client import Client
-        from asyncua.ua.uaerrors import UaError
+        from asyncua.ua import uaerrors
         from cryptography.exceptions import InvalidSignature
 
         quiet("asyncua")
@@ -229,9 +232,12 @@ class OpcUa:
             if options.security is not None:
                 await _secure(client, options.security)
             await connection.open(options.every_s)
-        except (UaError, InvalidSignature) as error:
+        except (uaerrors.BadUserAccessDenied, uaerrors.BadIdentityTokenRejected, uaerrors.BadIdentityTokenInvalid):
             await connection.close()
-            raise LinkError(f"{options.url}: {error or type(error).__name__}") from None
+            raise not_let_in(options.url, options.user, options.password) from None
+        except (uaerrors.UaError, InvalidSignature, OSError) as error:
+            await connection.close()
+            raise LinkError(f"{options.url}: {reason(error) or type(error).__name__}") from None
         except BaseException:
             await connection.close()
             raise

@@ -4,6 +4,8 @@ from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import pytest
+from pydantic import field_validator
+from support.third_party_driver import MemoryKind, MemoryOptions
 
 from firable.decompose.splitting.cut import split
 from firable.executor.drivers import kinds
@@ -50,6 +52,9 @@ commands:
   M.move: {device: plc, channel: M, write: {holding 2: 7}}
   M.stop: {device: plc, channel: M, write: {holding 2: 8}}
 """
+
+
+MODBUS = "driver: modbus-tcp\n    host: 10.0.0.1"
 
 
 def refusal(text: str, *, fit: bool = False) -> list[tuple[str, str]]:
@@ -102,6 +107,8 @@ def test_a_right_binding_is_read_and_fits(tmp_path: Path) -> None:
         ("on_loss: hold", "on_loss: forget", ("F1010", "14: forget")),
         ("read: discrete 0, ", "", ("F1009", "14: M.there")),
         ("invert: true", "invert: 2", ("F1010", "14: 2")),
+        (MODBUS, "driver: mqtt\n    host: broker\n    password: secret", ("F1010", "7: password")),
+        (MODBUS, "driver: opcua\n    url: opc.tcp://plc\n    password: secret", ("F1010", "7: password")),
     ],
 )
 def test_what_is_no_binding_is_refused_where_it_stands(old: str, new: str, found: tuple[str, str]) -> None:
@@ -249,6 +256,28 @@ def test_a_driver_of_others_is_found_by_its_entry_point(monkeypatch: pytest.Monk
     # What is firable's own cannot be taken over.
     monkeypatch.setattr(kinds, "entry_points", lambda **_: [EntryPoint("modbus-tcp", "os:path", kinds.GROUP)])
     assert kinds.kind_named("modbus-tcp") is not None
+
+
+class Even(MemoryOptions):
+    """Options of others that say themselves what is wrong with them."""
+
+    @field_validator("memory")
+    @classmethod
+    def _even(cls, memory: str) -> str:
+        raise ValueError(f"'{memory}' is an odd memory")
+
+
+def test_what_the_options_of_others_say_is_told_at_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    theirs = EntryPoint("theirs", "support.third_party_driver:KIND", kinds.GROUP)
+    monkeypatch.setattr(kinds, "entry_points", lambda **_: [theirs])
+    monkeypatch.setattr(MemoryKind, "options", Even)
+    with pytest.raises(InputError) as refused:
+        parse_binding(edited(MODBUS, "driver: theirs\n    memory: m"))
+    (problem,) = refused.value.diagnostics
+    assert (problem.code, problem.hint) == ("F1010", "")
+    assert problem.message == "'m' is an odd memory in 'devices.plc.memory'"
+    assert problem.span is not None
+    assert problem.span.line == 6
 
 
 TLS = """

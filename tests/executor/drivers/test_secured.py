@@ -25,6 +25,7 @@ from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.bound import BoundDriver
 from firable.executor.drivers.far_side.mqtt_device import MqttEnd, mosquitto
 from firable.executor.drivers.far_side.opcua_server import OpcUaEnd
+from firable.executor.drivers.far_side.ports import free_port
 
 BINDING = """
 firable_bind: 1
@@ -114,7 +115,7 @@ def test_opc_ua_server_that_demands_encryption_and_a_password_is_read_and_anothe
         try:
             await is_read(keys(server[0]), point)
             await is_refused(url, point)
-            await is_refused(keys(server[0], "wrong"), point)
+            await is_refused(keys(server[0], "wrong"), point, "does not let the user 'cell' in: is the password right?")
             await is_refused(keys(server[0], mode="Sign"), point)
             await is_refused(keys(stranger[0]), point)
             await is_refused(keys(client[1]), point, "is no certificate and its key")
@@ -148,14 +149,19 @@ require_certificate true"""
         end.show(point, value=True)
         at = f"driver: mqtt, host: 127.0.0.1, port: {end.port}"
 
-        def keys(ca: object, own: Any, password: str = "secret") -> str:
+        def keys(ca: object, own: Any, password: str | None = "secret") -> str:
             files = f"ca: {ca}, certificate: {own.certificate}, key: {own.key}"
-            return f"{at}, user: cell, password: {password}, tls: {{{files}}}"
+            shown = "" if password is None else f"password: {password}, "
+            return f"{at}, user: cell, {shown}tls: {{{files}}}"
 
         try:
             await is_read(keys(site.authority, client), point)
             await is_refused(at, point)
-            await is_refused(keys(site.authority, client, "wrong"), point)
+            in_vain = f"127.0.0.1:{end.port} does not let the user 'cell' in:"
+            await is_refused(keys(site.authority, client, "wrong"), point, f"{in_vain} is the password right?")
+            await is_refused(keys(site.authority, client, None), point, f"{in_vain} no password is given")
+            nobody = keys(site.authority, client, None).replace("user: cell, ", "")
+            await is_refused(nobody, point, f"127.0.0.1:{end.port} does not let this host in, which gives no user")
             await is_refused(keys(site.authority, stranger), point)
             await is_refused(keys(other.authority, client), point)
             await is_refused(f"{at}, user: cell, password: secret, tls: true", point)
@@ -163,3 +169,17 @@ require_certificate true"""
             await end.stop()
 
     asyncio.run(main())
+
+
+@pytest.mark.parametrize(
+    ("keys", "where"),
+    [
+        ("driver: mqtt, host: 127.0.0.1, port: {port}", "127.0.0.1:{port}"),
+        ("driver: opcua, url: 'opc.tcp://127.0.0.1:{port}/'", "opc.tcp://127.0.0.1:{port}/"),
+    ],
+    ids=["MQTT", "OPC UA"],
+)
+def test_where_nobody_serves_is_told_in_words_with_the_address(keys: str, where: str) -> None:
+    port = free_port()
+    why = f"D: not connected: {where.format(port=port)}: Connection refused"
+    asyncio.run(is_refused(keys.format(port=port), "ns=2;s=s", why))
