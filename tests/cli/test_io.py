@@ -83,6 +83,21 @@ def test_signals_are_shown_and_forced_only_where_the_binding_allows_it(
     assert "does not allow 'robot.touch' to be forced" in capsys.readouterr().err
 
 
+def test_sensors_of_a_cell_on_a_serial_line_can_be_forced_as_those_of_others(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bind = tmp_path / "cell.bind.yaml"
+    serving = firable("sim", "catalogue:one_robot", "--serial", "--bind", str(bind), "--workpieces", "0")
+    try:
+        Cell(serving, bind).line_with("serving 'one-robot'")
+        assert main(["io", str(bind), "--once", "--force", "mc.part_present=1"]) == 0
+        assert main(["io", str(bind), "--once"]) == 0
+        assert capsys.readouterr().out.count("mc.part_present         1      good") == 2
+    finally:
+        serving.terminate()
+        serving.communicate(timeout=PATIENCE_SECONDS)
+
+
 def shown(capsys: pytest.CaptureFixture[str]) -> list[dict[str, Any]]:
     """What was printed, line by line, each as the published schema has it."""
     lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
@@ -262,7 +277,9 @@ def test_device_that_cannot_be_served_here_is_refused(tmp_path: Path, capsys: py
     bind = tmp_path / "c.bind.yaml"
     bind.write_text(binding_text(NET, {"serial": "/dev/ttyS0"}, SENSORS))
     assert main(["sim", "catalogue:one_robot", "--bind", str(bind)]) == 2
-    assert "error[F5104]: `driver: serial` leads to nothing that can be served" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "error[F5104]: `driver: serial` leads to nothing that can be served" in said
+    assert "name the protocols again, as --serial" in said
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()

@@ -66,7 +66,7 @@ class _Layout:
         """How the i-th sensor is read, and whether it may be forced."""
         if self.protocol == "modbus":
             return f"read: discrete {i + 1}"
-        return f"read: {self._named(f'sensors/{name}')}{', force: true' if self.protocol != 'serial' else ''}"
+        return f"read: {self._named(f'sensors/{name}')}, force: true"
 
     def button(self, sensors: int) -> Point:
         """Where the contact of the emergency stop is read, behind so many sensors."""
@@ -150,6 +150,8 @@ def _address(binding: Binding, name: str) -> tuple[str, int]:
         case _:
             message = f"`driver: {driver}` leads to nothing that can be served on this host"
             hint = "let the binding be made: name the protocols, such as --modbus --opcua"
+            if driver == "serial":
+                hint = "a serial line is made anew each time, with its binding: name the protocols again, as --serial"
             raise InputError([binding.problem("F5104", ("devices", name, "driver"), message, hint)])
     return "127.0.0.1" if host == "localhost" else str(host), int(port)
 

@@ -79,5 +79,7 @@ class SerialEnd:
                 self._put(f".{line[1:]}")
             elif "=" in line:
                 point, _, value = line.partition("=")
+                if point in self.values:  # something that it shows is forced
+                    self.values[point] = value
                 self._put(line)
                 self.written(point, value)
