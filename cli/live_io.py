@@ -83,12 +83,16 @@ def _forced(binding: Binding, text: str) -> tuple[str, bool]:
     from firable.nets.diagnostics import did_you_mean
 
     name, _, value = text.partition("=")
-    known = [signal for signal, bound in binding.document.signals.items() if bound is not None]
+    signals = binding.document.signals
+    known = [signal for signal, bound in signals.items() if bound is not None]
+    if name in signals and name not in known:
+        said = "its machine says when it is done, and no sensor that could be forced has a part in it"
+        raise click.UsageError(f"'{name}' is `acknowledged`: {said}")
     if name not in known:
         raise click.UsageError(f"no signal '{name}' is read; {did_you_mean(name, known)}there are {', '.join(known)}")
     if value not in {"0", "1"}:
         raise click.UsageError(f"--force {text}: write {name}=0 or {name}=1")
-    bound = binding.document.signals[name]
+    bound = signals[name]
     if bound is None or not bound.force:
         raise click.UsageError(f"the binding does not allow '{name}' to be forced: that takes `force: true` in it")
     return name, value == "1"

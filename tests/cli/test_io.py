@@ -81,6 +81,10 @@ def test_signals_are_shown_and_forced_only_where_the_binding_allows_it(
     assert "mc.part_present         1      good" in capsys.readouterr().out
     assert main(["io", str(cell.bind), "--force", "robot.touch=1"]) == 2
     assert "does not allow 'robot.touch' to be forced" in capsys.readouterr().err
+    assert main(["io", str(cell.bind), "--force", "robot.at_cv1=1"]) == 2
+    assert "'robot.at_cv1' is `acknowledged`: its machine says when it is done" in capsys.readouterr().err
+    assert main(["io", str(cell.bind), "--force", "robot.tuch=1"]) == 2
+    assert "no signal 'robot.tuch' is read; did you mean 'robot.touch'?" in capsys.readouterr().err
 
 
 def test_sensors_of_a_cell_on_a_serial_line_can_be_forced_as_those_of_others(
