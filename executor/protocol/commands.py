@@ -30,6 +30,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
+from types import MappingProxyType
 from typing import Final
 
 from firable.executor.protocol.messages import Effect, Keep, ProtocolError, Sending, Stored
@@ -82,7 +83,9 @@ class Commands:
         for sender in subnet.places:
             if sender.command is not None and sender.completion is not None:
                 shared.setdefault(sender.completion, []).append(_place_key(sender.name))
-        self.beside = {completion: keys for completion, keys in shared.items() if len(keys) > 1}
+        self.beside = MappingProxyType(
+            {completion: tuple(keys) for completion, keys in shared.items() if len(keys) > 1}
+        )
         """Under which keys earlier commands stand that a signal completes as well."""
         self.newest: dict[str, Command] = {}
         """By the key under which each is kept."""

@@ -39,6 +39,7 @@ repeated, and their decisions applied, with the commands owed.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
+from types import MappingProxyType
 from typing import Self
 
 from firable.executor.protocol.above import Above, Promise, union
@@ -81,11 +82,11 @@ class LocalController:
             part.name: row.name for row in decomposition.coordinated for part in row.parts if part.controller == name
         }
         compiled = self.player.transitions
-        self.parts: dict[str, Compiled] = {row: compiled[part] for part, row in part_of.items()}
+        self.parts: Mapping[str, Compiled] = MappingProxyType({row: compiled[part] for part, row in part_of.items()})
         self.transitions = tuple(compiled.values())
         width = len(self.subnet.places) + len(self.subnet.signals)
         self.enabled = EnabledSet([(c.needs, c.forbids) for c in self.transitions], width)
-        self.rows = {t: part_of[c.name] for t, c in enumerate(self.transitions) if c.name in part_of}
+        self.rows = MappingProxyType({t: part_of[c.name] for t, c in enumerate(self.transitions) if c.name in part_of})
         """The coordinated transition of each part, by the index of the part."""
         self.local_mask = sum(1 << t for t in range(len(self.transitions)) if t not in self.rows)
         """The transitions that it fires by itself."""
@@ -120,7 +121,7 @@ class LocalController:
         """Whether its host is about to end."""
         self.forgone = 0
         """The transitions that an operator lets fire no more, by their indexes."""
-        self.index_of = {row: t for t, row in self.rows.items()}
+        self.index_of = MappingProxyType({row: t for t, row in self.rows.items()})
         self.epoch = 0
 
     @classmethod

@@ -46,6 +46,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Self
 
 from firable.executor.protocol.deciders import TOP, coordinator_at, coordinators
@@ -96,16 +97,20 @@ class Coordinator:
         names = coordinators(decomposition)
         self.first_round, self.stride = names.index(name), len(names)
         """Its rounds are this one, and every so many-th after it."""
-        self.participants = {
-            row.name: tuple(part.controller for part in row.parts)
-            for row in decomposition.coordinated
-            if coordinator_at(row.at) == name
-        }
+        self.participants = MappingProxyType(
+            {
+                row.name: tuple(part.controller for part in row.parts)
+                for row in decomposition.coordinated
+                if coordinator_at(row.at) == name
+            }
+        )
         """For each transition that it decides, who takes part: those who own a gate of it alone, too (O3)."""
         free = {t: frozenset(c for name, c in decomposition.free if name == t) for t, _ in decomposition.free}
-        self.free = {t: free.get(t, frozenset()) for t in self.participants}
+        self.free = MappingProxyType({t: free.get(t, frozenset()) for t in self.participants})
         """For each of them, those whose part is free of promise."""
-        self.of_free = {c: frozenset(t for t in self.free if c in self.free[t]) for at in free.values() for c in at}
+        self.of_free = MappingProxyType(
+            {c: frozenset(t for t in self.free if c in self.free[t]) for at in free.values() for c in at}
+        )
         """For each controller, the transitions of which its part is."""
         ours = [g for g in decomposition.groups if g.controller is None and coordinator_at(g.at) == name]
         self.arbiter = Arbiter(decomposition.net, ours)
@@ -116,7 +121,7 @@ class Coordinator:
             *map(tuple, map(dict.fromkeys, together)),
             *((t,) for t in self.participants if t not in grouped),
         )
-        self.group_of = {name: g for g, group in enumerate(self.groups) for name in group}
+        self.group_of = MappingProxyType({name: g for g, group in enumerate(self.groups) for name in group})
         self.seen: dict[str, int] = {subnet.name: -1 for subnet in decomposition.subnets}
         self.ready: dict[str, frozenset[str]] = {subnet.name: frozenset() for subnet in decomposition.subnets}
         """What each controller has reported; of its free parts, those of which the vote counts but for (a)."""

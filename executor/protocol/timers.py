@@ -17,8 +17,9 @@ left, and come again after another has entered, and so needs numbers and a test 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from math import inf
+from types import MappingProxyType
 from typing import Final
 
 from firable.executor.protocol.token_player import TokenPlayer, Word
@@ -32,12 +33,14 @@ class Timers:
     """The times of a subnet, none running."""
 
     def __init__(self, player: TokenPlayer) -> None:
-        self.places: dict[str, Place] = {place.name: place for place in player.net.places if place.within is not None}
-        self.signals: dict[str, Place] = {
-            place.within.timer: place for place in self.places.values() if place.within is not None
-        }
+        self.places: Mapping[str, Place] = MappingProxyType(
+            {place.name: place for place in player.net.places if place.within is not None}
+        )
+        self.signals: Mapping[str, Place] = MappingProxyType(
+            {place.within.timer: place for place in self.places.values() if place.within is not None}
+        )
         """The places with a time limit, by their timers."""
-        self._waits = {name: self._bits(player, place) for name, place in self.places.items()}
+        self._waits = MappingProxyType({name: self._bits(player, place) for name, place in self.places.items()})
         self.running: dict[str, float] = {}
         """When the time of each place will be over; minus infinity where it has not begun."""
 

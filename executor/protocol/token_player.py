@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 from typing import Final, Self
 
 from firable.executor.protocol.enabled import Literal, bits, bits_behind, first_behind, literal
@@ -195,8 +196,10 @@ class Arbiter:
         )
         self.turns: Turns = self.arbitration.first_turns
         self.last = -1
-        self.rivals = [sum(1 << t for t in component) for component in self.arbitration.conflicts.components]
-        self.group_of = {t: g for g, group in enumerate(self.arbitration.groups) for t in group.sequence}
+        self.rivals = tuple(sum(1 << t for t in component) for component in self.arbitration.conflicts.components)
+        self.group_of = MappingProxyType(
+            {t: g for g, group in enumerate(self.arbitration.groups) for t in group.sequence}
+        )
         """The group in whose turns a transition has a place."""
 
     def choose(self, enabled: Iterable[str]) -> str:

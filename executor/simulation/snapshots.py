@@ -12,7 +12,7 @@ from collections.abc import Callable, Hashable
 from copy import copy
 from dataclasses import fields, is_dataclass
 from enum import Enum
-from functools import cache
+from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
 from firable.executor.protocol.commands import Commands
@@ -25,7 +25,7 @@ from firable.nets.net import Net
 from firable.semantics.arbitration import Arbitration
 
 T = TypeVar("T")
-_FIXED: Final = (Net, TokenPlayer, Compiled, Arbitration)
+_FIXED: Final = (Net, TokenPlayer, Compiled, Arbitration, MappingProxyType)
 _SIMPLE: Final = (bool, int, float, str, type(None), Enum, frozenset)
 _CHANGING: Final = (LocalController, Coordinator, Commands, Arbiter, Timers)
 _DERIVED: Final = EnabledSet
@@ -40,16 +40,21 @@ def clone(value: T) -> T:
 
 def frozen(value: Any) -> Hashable:
     """A value that is equal for two machines iff all that can change in them is."""
-    found: Hashable = _freezer(value.__class__)(value)
-    return found
+    of = value.__class__
+    if of not in _FREEZERS:
+        _FREEZERS[of] = _freezer(of)
+    freezer = _FREEZERS[of]
+    return value if freezer is None else freezer(value)
 
 
 def _cloned(value: Any) -> Any:
-    copier = _copier(value.__class__)
+    of = value.__class__
+    if of not in _COPIERS:
+        _COPIERS[of] = _copier(of)
+    copier = _COPIERS[of]
     return value if copier is None else copier(value)
 
 
-@cache
 def _copier(of: type) -> Callable[[Any], Any] | None:
     """How values of a type are copied; None where they never change."""
     if issubclass(of, (*_SIMPLE, *_FIXED)) or _is_frozen(of):
@@ -68,19 +73,19 @@ def _copier(of: type) -> Callable[[Any], Any] | None:
 
 
 def _copy_of_tuple(value: tuple[Any, ...]) -> tuple[Any, ...]:
-    return value if all(_copier(each.__class__) is None for each in value) else tuple(map(_cloned, value))
+    made = [_cloned(each) for each in value]
+    for each, its in zip(value, made, strict=True):
+        if each is not its:
+            return tuple(made)
+    return value
 
 
 def _copy_of_dict(value: dict[Any, Any]) -> dict[Any, Any]:
-    made = value.copy()
-    for key, each in value.items():
-        if (copier := _copier(each.__class__)) is not None:
-            made[key] = copier(each)
-    return made
+    return {key: _cloned(each) for key, each in value.items()}
 
 
 def _copy_of_list(value: list[Any]) -> list[Any]:
-    return list(map(_cloned, value))
+    return [_cloned(each) for each in value]
 
 
 def _copy_of_machine(value: Any) -> Any:
@@ -89,25 +94,28 @@ def _copy_of_machine(value: Any) -> Any:
     return made
 
 
-@cache
-def _freezer(of: type) -> Callable[[Any], Hashable]:
-    """What values of a type are compared by."""
+def _freezer(of: type) -> Callable[[Any], Hashable] | None:
+    """What values of a type are compared by; None where by themselves."""
     if issubclass(of, (*_FIXED, _DERIVED)):
         return lambda _: None
     if issubclass(of, _SIMPLE) or _is_frozen(of):
-        return lambda value: value
+        return None
     if issubclass(of, tuple | list):
-        return lambda value: tuple(map(frozen, value))
+        return lambda value: tuple([frozen(each) for each in value])
     if issubclass(of, dict):
-        return lambda value: tuple((key, frozen(each)) for key, each in value.items())
+        return lambda value: tuple([(key, frozen(each)) for key, each in value.items()])
     if issubclass(of, set):
         return frozenset
     if is_dataclass(of):
         names = _names(of)
-        return lambda value: tuple(frozen(getattr(value, name)) for name in names)
+        return lambda value: tuple([frozen(getattr(value, name)) for name in names])
     if issubclass(of, _CHANGING):
-        return lambda value: tuple(map(frozen, vars(value).values()))
+        return lambda value: tuple([frozen(each) for each in vars(value).values()])
     raise TypeError(f"a machine holds a {of.__name__}, which is not known here")
+
+
+_COPIERS: Final[dict[type, Callable[[Any], Any] | None]] = {}
+_FREEZERS: Final[dict[type, Callable[[Any], Hashable] | None]] = {}
 
 
 def _is_frozen(of: type) -> bool:
