@@ -19,7 +19,12 @@ The first is checked at acts, on the code itself, each in one setting and not in
 
 What is not told apart behind an act is what every act meets in every way: hints and who waits; whose turn it is (an
 arbiter decides behind each last one); what was heard last, and of whom in this epoch (to repeat is tried with both);
-how often it has restarted. Rejected: all groups at once, which is all interleavings of independent rounds again; and
+how often it has restarted. Nor is it told apart which of several controllers is known for what, where they take part in
+the same transitions in the same way, nor who voted first (symmetry: Emerson and Sistla, Formal Methods in System Design
+9, 1996). Names are keys to a coordinator, and no more; tests hold each act to what it is with two of them exchanged.
+Other groups tell such controllers apart, so that a comparison in a setting is made for one order of them.
+
+Rejected: all groups at once, which is all interleavings of independent rounds again; and
 to let a coordinator hear only what controllers told in runs, which are some.
 """
 
@@ -105,8 +110,13 @@ class Deciding(OneMachine):
     # --- What is not told apart
 
     def likened(self, number: int) -> Iterator[int]:
-        """The coordinator with nothing of other groups."""
-        yield self._changed(number, "group alone", self._group_alone)
+        """The coordinator with nothing of other groups, and its controllers that are alike in one order."""
+        yield self._changed(number, "likened", self._likened)
+
+    def _likened(self, machine: Coordinator, kept: Kept) -> None:
+        self._group_alone(machine, kept)
+        for alike in self.hearing.alike:
+            in_order(machine, alike)
 
     def _group_alone(self, machine: Coordinator, kept: Kept) -> None:
         machine.arbiter.last = -1
@@ -215,6 +225,22 @@ class Deciding(OneMachine):
         if not isinstance(machine, Coordinator):
             raise TypeError(f"{machine.name!r} is no coordinator")
         return machine
+
+
+def in_order(machine: Coordinator, alike: Sequence[str]) -> None:
+    """Change controllers that are alike for each other, so that what is known of them comes in one order."""
+
+    def known(c: str) -> tuple[object, ...]:
+        of_rounds = ((c in each.acknowledged, c in each.votes, sorted(each.votes.get(c, ()))) for each in rounds)
+        return sorted(machine.ready[c]), *of_rounds
+
+    rounds = list(machine.rounds.values())
+    called = dict(zip(sorted(alike, key=known), alike, strict=True))
+    machine.ready |= {called[c]: machine.ready[c] for c in alike}
+    for each in rounds:
+        each.acknowledged = {called.get(c, c) for c in each.acknowledged}
+        votes = {called.get(c, c): vote for c, vote in each.votes.items()}
+        each.votes = {c: votes[c] for c in each.participants if c in votes}
 
 
 def _turn(last: int, machine: Coordinator, kept: Kept) -> None:

@@ -66,6 +66,11 @@ class Hearing:
         self.parts = {c: [t for t in self.group if c in machine.participants[t]] for c in self.participants}
         self.free = {c: [t for t in self.parts[c] if c in machine.free[t]] for c in self.participants}
         self.promising = {c: [t for t in self.parts[c] if c not in machine.free[t]] for c in self.participants}
+        by_parts: dict[object, list[str]] = {}
+        for c in self.participants:
+            by_parts.setdefault((tuple(self.free[c]), tuple(self.promising[c])), []).append(c)
+        self.alike = [names for names in by_parts.values() if len(names) > 1]
+        """Controllers that take part in the same transitions in the same way."""
         self.settings = [*self._hints(machine, group), *self._beside(machine, group)]
         others = [g for g in range(len(machine.groups)) if g != group]
         blocking = [Beside(g, is_older=True, is_committed=False, keeps_all=True) for g in others[:1]]
