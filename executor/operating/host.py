@@ -210,12 +210,12 @@ class Host:
 
     @property
     def standing(self) -> Standing:
-        """What keeps everything standing here, as the other hosts are told; one that is ending is no news but lost."""
+        """What keeps everything standing here, as the other hosts are told."""
         if self.latch is not None:
             return Standing.LATCHED
         if self.taking_up is not None:
             return Standing.HELD
-        return Standing.PAUSED if self.paused and not self.stopping else Standing.GOING
+        return Standing.PAUSED if self.paused else Standing.GOING
 
     def situation(self) -> Situation:
         """What the host is doing, and what waits for what; exact at quiescence, as far as its machines know."""
@@ -355,7 +355,8 @@ class Host:
     def settle(self) -> None:
         """At quiescence, wake who waits for it, and end the run if nothing will happen."""
         self._release()
-        self.peers.stand(self.standing)
+        if not self.stopping:  # it is lost, soon
+            self.peers.stand(self.standing)
         if self.ends_at_home and not self.stopping and not self.paused and stopping.ends_cycle(self):
             return
         ended = ending.ended(self)

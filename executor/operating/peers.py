@@ -136,6 +136,7 @@ class Peers:
         loop = asyncio.get_running_loop()
         watchdog = loop.call_later(MEET_SECONDS, self._should_have_come)
         self._repeat_later(self.repeat_seconds)
+        self.link.stand(self.standing)  # whatever it was in an earlier life
         try:
             await self.link.run(self)
         finally:

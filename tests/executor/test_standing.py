@@ -64,6 +64,21 @@ def test_a_host_that_is_paused_is_told_of_on_the_others_until_it_goes_on() -> No
     run_in_virtual_time(main())
 
 
+def test_a_host_that_is_paused_and_ends_is_lost_and_does_not_go_on() -> None:
+    async def main() -> None:
+        cell = Cell()
+        a = cell.start(("a",), MemoryJournal())
+        a.pause()
+        await asyncio.sleep(5)
+        a.stop()
+        await asyncio.sleep(5)
+        assert cell.told == ["'a' is paused"]
+        assert cell.said == "'a' is not connected"
+        await cell.end()
+
+    run_in_virtual_time(main())
+
+
 def test_a_host_that_is_held_or_latched_is_told_of_on_the_others() -> None:
     async def main() -> None:
         cell, journal = Cell(), MemoryJournal()
