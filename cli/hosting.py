@@ -15,7 +15,7 @@ from firable.cli import text
 from firable.cli.finite import FiniteRange
 from firable.cli.log import told_aside
 from firable.cli.report import Report
-from firable.cli.watched import AFTER_A_FAULT, machines_verdict, show_coalesced
+from firable.cli.watched import AFTER_A_FAULT_OF_A_HOST, machines_verdict, show_coalesced
 from firable.nets.source import printable
 
 if TYPE_CHECKING:
@@ -273,6 +273,6 @@ def _verdict(situation: Situation, machines: tuple[str, ...]) -> Verdict:
         "the host ran until it was stopped, and left nothing open",
         "run of one host",
         bound="" if fault else situation.message,
-        hint=AFTER_A_FAULT if fault else "",
+        hint=AFTER_A_FAULT_OF_A_HOST if fault else "",
         subjects=(situation.message,) if fault else tuple(name or "coordinator" for name in machines),
     )

@@ -15,11 +15,16 @@ if TYPE_CHECKING:
     from firable.executor.operating.hosting import HostReport
     from firable.nets.verdict import Verdict
 
+_AGAIN: Final = "mend what it tells of, and give the same command again: with its --journal "
 AFTER_A_FAULT: Final = (
-    "mend what it tells of, and give the same command again: with its --journal the run is taken up where it stood; "
-    "without one bring the cell to its initial marking first"
+    f"{_AGAIN}the run is taken up where it stood; without one bring the cell to its initial marking first"
 )
 """What to do after a run on machines that has ended by a fault."""
+AFTER_A_FAULT_OF_A_HOST: Final = (
+    f"{_AGAIN}this host goes on where it stood; without one bring the cell to its initial marking, and start all hosts "
+    "anew, each with a new journal"
+)
+"""The same after that of one host among others, which know it by its journal."""
 
 
 def machines_verdict(report: RunReport | HostReport, method: str) -> tuple[Verdict, ...]:

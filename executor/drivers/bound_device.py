@@ -213,6 +213,7 @@ class BoundDevice:
         for channel in self.channels.values():
             if (forgotten := channel.connected_again()) is not None:
                 self._fault(f"knows nothing any more of '{forgotten.text}' of '{forgotten.place}', which it had taken")
+            self._await_taking(channel)
         if not self.was_ready:
             loop = asyncio.get_running_loop()
             self.ready_seconds = loop.time()

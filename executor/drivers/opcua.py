@@ -235,6 +235,9 @@ class OpcUa:
         except (uaerrors.BadUserAccessDenied, uaerrors.BadIdentityTokenRejected, uaerrors.BadIdentityTokenInvalid):
             await connection.close()
             raise not_let_in(options.url, options.user, options.password) from None
+        except TimeoutError:
+            await connection.close()
+            raise
         except (uaerrors.UaError, InvalidSignature, OSError) as error:
             await connection.close()
             raise LinkError(f"{options.url}: {reason(error) or type(error).__name__}") from None

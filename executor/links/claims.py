@@ -62,7 +62,7 @@ class Claims:
         self.storages: dict[str, Storage] = {}
         """What each says of the storage of its host."""
         self.standings: dict[str, Standing] = {}
-        """How the host of each stands, where it does not go on."""
+        """How the host of each stands, as far as it has said."""
         self.given: dict[str, Said] = {}
         """What each session is answered."""
         self.taken: dict[str, Said] = {}
@@ -79,6 +79,7 @@ class Claims:
 
     def given_up(self, session: str) -> None:
         """A session is gone."""
+        self.standings.pop(session, None)
         if session not in self.machines:
             return
         self._connect(session, is_connected=False)
@@ -95,18 +96,12 @@ class Claims:
             del self.taken[session]
         self._settle()
 
-    def stands(self, session: str, standing: Standing, *, taken_back: bool = False) -> None:
-        """The host of a session stands so, or takes back that it does."""
-        was = self.standings.get(session, Standing.GOING)
-        if taken_back and was is not standing:
-            return  # there was a newer word
-        now = Standing.GOING if taken_back else standing
-        self.standings[session] = now
-        if now is Standing.GOING:
-            del self.standings[session]
+    def stands(self, session: str, standing: Standing) -> None:
+        """The host of a session stands so from now on."""
+        was, self.standings[session] = self.standings.get(session, Standing.GOING), standing
         for name in self.machines.get(session, ()):
-            if now is not was and self.reached.get(name) == session:
-                self.listener.stands(name, now)
+            if standing is not was and self.reached.get(name) == session:
+                self.listener.stands(name, standing)
 
     def _settle(self) -> None:
         for session in self.machines:
@@ -143,7 +138,7 @@ class Claims:
             if is_connected and name not in self.reached:
                 self.reached[name] = session
                 self.listener.connected(name, self.storages[session])
-                if (standing := self.standings.get(session)) is not None:
+                if (standing := self.standings.get(session, Standing.GOING)) is not Standing.GOING:
                     self.listener.stands(name, standing)
             elif not is_connected and self.reached.get(name) == session:
                 del self.reached[name]

@@ -27,6 +27,6 @@ class Standing(StrEnum):
 _PHRASES = {
     Standing.GOING: "goes on",
     Standing.PAUSED: "is paused",
-    Standing.HELD: "is held after a restart, until it is resumed",
+    Standing.HELD: "is held until it is resumed",
     Standing.LATCHED: "is held safe after an emergency stop, until it is reset and resumed",
 }

@@ -98,7 +98,7 @@ class ZenohLink:
         """What each session is answered."""
         self.standing = Standing.GOING
         self.stood: Any = None
-        """The token of that, where this host does not go on."""
+        """The token of that."""
         self.publishers: dict[tuple[str, str, str], zenoh.Publisher] = {}
         """For each sender here, receiver and session of the receiver."""
         self.damaged = 0
@@ -166,10 +166,8 @@ class ZenohLink:
         if self.lending is not None and self.lending.is_lent:
             self.lending.call_soon(self.stand, standing)
             return
-        before, self.stood = self.stood, None
-        if standing is not Standing.GOING:
-            key = f"{self._ours()}/stands/{self.identity}/{standing}"
-            self.stood = self.session.liveliness().declare_token(key)
+        before, key = self.stood, f"{self._ours()}/stands/{self.identity}/{standing}"
+        self.stood = self.session.liveliness().declare_token(key)
         if before is not None:
             before.undeclare()
 
@@ -276,7 +274,8 @@ class ZenohLink:
         elif what == "stands":
             session, standing = rest
             with suppress(ValueError):  # nothing that there is
-                claims.stands(session, Standing(standing), taken_back=gone)
+                if not gone:  # there is a newer word, or its session is gone
+                    claims.stands(session, Standing(standing))
         else:
             machines, claim = rest
             session, _, storage = claim.partition(_WITH)

@@ -18,9 +18,10 @@ that, or before anybody was met since this host was started, it ends: its places
 heard later things of this very journal, it ends whoever was met: its places are old, and nobody but it knows of others.
 
 *Another bundle or version*: of two such hosts neither can know which is wrong, and neither will be let in by the other.
-One that nobody has ever let in ends when all coordinators of its machines refuse it so: it can do nothing without them
-(F5020). One that was let in before is right, and goes on. The host of the coordinator at the top waits for others, who
-are let in by it: what comes to it by mistake, from another cell or of an old release, is told, and ends nobody here.
+One that nobody has ever let in ends when all coordinators of its machines refuse it so, and none that fits has come
+`MEET_SECONDS` later: it can do nothing without them (F5020). One that was let in before is right, and goes on. The host
+of the coordinator at the top waits for others, who are let in by it: what comes to it by mistake, from another cell or
+of an old release, is told, and ends nobody here.
 Rejected: that both end. Whoever starts a wrong host would then end the right ones that wait beside it.
 
 Where all machines are on one host there are no others, and this does nothing.
@@ -32,7 +33,7 @@ import asyncio
 from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
-from firable.executor.links.link import Arrival, Link, Refusal, all_called, called, known_otherwise
+from firable.executor.links.link import COORDINATOR, Arrival, Link, Refusal, all_called, called, known_otherwise
 from firable.executor.links.standing import Standing
 from firable.executor.links.storages import Estranged, Memory, Storage
 from firable.executor.operating.acquaintances import KEEP_SECONDS, Acquaintances
@@ -41,7 +42,7 @@ from firable.executor.operating.waits import reached, waits
 from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import Message, ToController
 from firable.nets.decomposition import Decomposition
-from firable.nets.diagnostics import InputError
+from firable.nets.diagnostics import Diagnostic, InputError
 
 REPEAT_SECONDS: Final = 0.2
 REPEAT_SECONDS_MAX: Final = 3.2
@@ -94,7 +95,9 @@ class Peers:
         self.turned_away: dict[str, str] = {}
         """What is said of each that was refused and has not come back as it should."""
         self.unlike: set[str] = set()
-        """Those that were met with another bundle or version."""
+        """Those that were met with another bundle or version, and not with this one since."""
+        self.hopeless: asyncio.TimerHandle | None = None
+        """What ends a host that can do nothing without those."""
         self.keep_due_seconds = 0.0
         """When ages that were heard are made durable by themselves."""
         self.is_due = False
@@ -141,8 +144,9 @@ class Peers:
             await self.link.run(self)
         finally:
             watchdog.cancel()
-            if self.timer is not None:
-                self.timer.cancel()
+            for timer in (self.timer, self.hopeless):
+                if timer is not None:
+                    timer.cancel()
             if self.acquaintances.has_heard:
                 self.acquaintances.write()  # the last sync of the host stores it
 
@@ -233,6 +237,7 @@ class Peers:
             self.met.add(peer)
             self.meeting.set()
             self.turned_away.pop(peer, None)
+            self.unlike.discard(peer)
             self.told("connected", f"{called(peer)} is connected")
             self._say_again()
 
@@ -262,18 +267,27 @@ class Peers:
             self.stand_still[peer] = standing
             if standing is Standing.GOING:
                 del self.stand_still[peer]
-            self.told("stands", f"{called(peer)} {standing.phrase}")
+            self.told("standing", f"{called(peer)} {standing.phrase}")
 
     def refused(self, peers: Sequence[str], why: Refusal) -> None:
-        """A host was refused: where nobody ever let this one in, and all who decide for it are unlike it, it ends."""
+        """A host was refused."""
+        self._turn_away(peers, f"the host of {all_called(peers)} is refused: {why.problem.message}; {why.problem.hint}")
         if why.are_unlike:
             self.unlike.update(peers)
-        if self.is_unmet and self.deciding and self.deciding <= self.unlike:
-            self.end(InputError([why.problem]))
-        else:
-            self._turn_away(
-                peers, f"the host of {all_called(peers)} is refused: {why.problem.message}; {why.problem.hint}"
-            )
+            if self._is_hopeless and self.hopeless is None:
+                loop = asyncio.get_running_loop()
+                self.hopeless = loop.call_later(MEET_SECONDS, self._end_if_hopeless, why.problem)
+
+    @property
+    def _is_hopeless(self) -> bool:
+        """Whether nobody ever let this host in, and all who decide for it are unlike it."""
+        is_top = COORDINATOR in self.acts.coordinators
+        return self.is_unmet and not is_top and bool(self.deciding) and self.deciding <= self.unlike
+
+    def _end_if_hopeless(self, problem: Diagnostic) -> None:
+        self.hopeless = None
+        if self._is_hopeless:
+            self.end(InputError([problem]))
 
     def disowned(self, peers: Sequence[str], why: Estranged) -> None:
         """A host knows machines here by another storage: where nobody has shown that this one is right, it ends.

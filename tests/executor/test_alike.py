@@ -61,17 +61,22 @@ def met(explorer: Deciding) -> Iterator[tuple[Coordinator, ToCoordinator]]:
             yield machine, message
 
 
-def hold_alike(explorer: Deciding) -> int:
-    """Hold each act to what it is where two controllers that are alike are exchanged; returns how many were held."""
+def hold_alike(explorer: Deciding, of: type[Coordinator] = Coordinator) -> int:
+    """Hold what follows from each message to what does where two controllers that are alike are exchanged.
+
+    Of the machines met, as one of `of` would do it. Returns how many were held.
+    """
     count = 0
     for machine, message in met(explorer):
         for alike in explorer.hearing.alike:
             for one, other in combinations(alike, 2):
                 first, second = clone(machine), exchanged(machine, one, other)
+                first.__class__ = second.__class__ = of
                 told = {one: other, other: one}.get(message.controller, message.controller)
                 effects, then = first.receive(message), second.receive(replace(message, controller=told))
-                assert known(exchanged(first, one, other)) == known(second)
-                assert said(effects, one, other) == said(then)
+                first.__class__ = second.__class__ = Coordinator
+                assert known(exchanged(first, one, other)) == known(second), f"{one} is not known as {other} would be"
+                assert said(effects, one, other) == said(then), f"{one} is not answered as {other} would be"
                 count += 1
     return count
 
@@ -93,8 +98,9 @@ def test_a_coordinator_that_prefers_a_controller_is_found() -> None:
             return [] if message.controller == "mc" and asked else super().receive(message)
 
     decomposition = decomposition_of("one_robot")
-    with pytest.raises(AssertionError):
-        hold_alike(Deciding(decomposition, TOP, group_of(decomposition, "G4"), coordinator=Prefers))
+    explorer = Deciding(decomposition, TOP, group_of(decomposition, "G4"))
+    with pytest.raises(AssertionError, match="is not answered as"):
+        hold_alike(explorer, of=Prefers)
 
 
 @pytest.mark.parametrize(("cell", "t"), [("one_robot", "G4"), ("free two_robots_shared", "G5")])

@@ -18,6 +18,7 @@ from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import KEY, TRACE, Recorder
 from firable.executor.operating.situation import State
+from firable.executor.protocol.commands import Answer
 from firable.nets.interchange import net_digest
 from firable.nets.text import parse_net
 
@@ -67,6 +68,23 @@ async def interrupted(*ends: MemoryEnd) -> Journal:
     run.stop()
     await ending
     return journal
+
+
+def test_an_operator_of_a_held_run_is_heard_while_a_device_is_away_that_nobody_asks_after() -> None:
+    async def main() -> None:
+        answering, away = MemoryEnd("A"), MemoryEnd("B")
+        journal = await interrupted(answering, away)
+        answering.values.update({"taken": "?", "done": "?"})
+        await away.cut()
+        run = host(journal)
+        run.served = True
+        ending = asyncio.create_task(run.main())
+        await asyncio.sleep(2)
+        assert run.say("a.busy", Answer.DONE)
+        run.stop()
+        await ending
+
+    run_in_virtual_time(main())
 
 
 @pytest.mark.parametrize(("comes_after_s", "is_told"), [(0.0, False), (2.0, False), (60.0, True)])

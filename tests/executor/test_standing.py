@@ -1,6 +1,8 @@
 """Who wonders on one host why nothing moves is told that another one is paused, held or latched."""
 
 import asyncio
+import io
+import logging
 
 from support.two_hosts import SPLIT, Hosts
 
@@ -9,6 +11,7 @@ from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.links.link import COORDINATOR
 from firable.executor.operating.host import Host
+from firable.executor.operating.log import Log, logger_to
 
 CENTRE = (COORDINATOR, "b")
 
@@ -21,7 +24,7 @@ class Cell(Hosts):
         self.told: list[str] = []
         self.tasks: list[asyncio.Task[object]] = []
         self.centre = self.start(CENTRE, MemoryJournal())
-        self.centre.tell = lambda kind, sentence: self.told.append(sentence) if kind == "stands" else None
+        self.centre.tell = lambda kind, sentence: self.told.append(sentence) if kind == "standing" else None
 
     def start(self, machines: tuple[str, ...], journal: Journal) -> Host:
         run = self.host(machines, journal)
@@ -43,7 +46,8 @@ class Cell(Hosts):
 
 def test_a_host_that_is_paused_is_told_of_on_the_others_until_it_goes_on() -> None:
     async def main() -> None:
-        cell = Cell()
+        cell, log = Cell(), io.StringIO()
+        cell.centre.recorder.observers.append(Log(logger_to(logging.StreamHandler(log))).seen)
         a = cell.start(("a",), MemoryJournal())
         a.pause()
         await asyncio.sleep(5)
@@ -58,6 +62,7 @@ def test_a_host_that_is_paused_is_told_of_on_the_others_until_it_goes_on() -> No
         await asyncio.sleep(5)
         assert "paused" not in cell.said + a.situation().message
         assert cell.told == ["'a' is paused", "'a' goes on"]
+        assert log.getvalue().count('"event": "standing"') == 2
         assert a.marking == ("a.over",)
         await cell.end()
 
@@ -89,13 +94,13 @@ def test_a_host_that_is_held_or_latched_is_told_of_on_the_others() -> None:
         assert "'a' is held safe after an emergency stop, until it is reset and resumed" in cell.said
         assert not a.reset()
         await asyncio.sleep(5)
-        assert "'a' is held after a restart, until it is resumed" in cell.said
+        assert "'a' is held until it is resumed" in cell.said
         a.stop()
         await asyncio.sleep(5)
         assert cell.said == "'a' is not connected"
         again = cell.start(("a",), journal)
         await asyncio.sleep(5)
-        assert cell.said == "'a' is held after a restart, until it is resumed"
+        assert cell.said == "'a' is held until it is resumed"
         assert again.resume()
         await asyncio.sleep(5)
         assert cell.said == ""

@@ -16,7 +16,7 @@ def free_port() -> int:
     Whoever tries again and again to reach a port of the other kind where nobody listens yet is connected to himself at
     some time (TCP knows a simultaneous open), hears what he has said, and keeps the port from whom it was meant for.
     """
-    for port in random.sample(range(_DEALT // 2, _DEALT), 1000):
+    for port in random.SystemRandom().sample(range(_DEALT // 2, _DEALT), 1000):
         with suppress(OSError), socket.create_server(("127.0.0.1", port)):
             return port
     raise OSError(f"no port of this host between {_DEALT // 2} and {_DEALT} is free")

@@ -57,3 +57,14 @@ class TestOpcUa(DriverConformance):
             await self.end.stop()
 
         self.run(main())
+
+
+def test_a_server_that_takes_a_connection_and_says_nothing_has_not_answered_in_time() -> None:
+    async def main() -> None:
+        silent = await asyncio.start_server(lambda *_: asyncio.sleep(60), "127.0.0.1", 0)
+        options = OpcUaOptions(url=f"opc.tcp://127.0.0.1:{silent.sockets[0].getsockname()[1]}/")
+        with pytest.raises(TimeoutError):  # which is told as that by whoever keeps the connection
+            await KIND.connect(options, Wanted((POINTS["sensor"],), 0.2))
+        silent.close()
+
+    asyncio.run(main())

@@ -92,6 +92,30 @@ def test_a_command_that_its_device_does_not_take_is_told_with_its_points_until_i
     asyncio.run(main())
 
 
+def test_a_request_by_a_bit_that_is_not_taken_is_told_also_where_the_line_was_cut_meanwhile() -> None:
+    """It is not written again then, as its bit still stands."""
+
+    async def main() -> None:
+        far, written = await far_end(takes=False)
+        far.values.update({"in": 0, "ok": 0})
+        told: list[str] = []
+        by_bit = BINDING.replace("{command: out,", "{request: out,").replace(
+            "channel: A}", "channel: A, write: {code: 1}}"
+        )
+        host = host_of(bound_driver(parse_binding(by_bit), NET), told)
+        ending = asyncio.create_task(host.main())
+        await until(lambda: True in written, "the request")
+        await far.cut()
+        await asyncio.sleep(0.3)
+        assert not [sentence for sentence in told if "has not taken" in sentence]
+        await far.mend()
+        await until(lambda: any(f"has not taken {GIVEN}" in sentence for sentence in told), "the sentence")
+        host.stop()
+        await ending
+
+    asyncio.run(main())
+
+
 @pytest.mark.parametrize("takes", [False, True])
 def test_a_command_that_is_overdue_says_whether_its_machine_has_shown_that_it_took_it(takes: bool) -> None:
     async def main() -> None:

@@ -114,11 +114,7 @@ class Wires:
         before, party.standing = party.standing, standing
         for other in self.parties:
             if other is not party and standing is not before:
-                if standing is not Standing.GOING:
-                    self.wire(party, other).append(partial(other.claims.stands, party.session, standing))
-                if before is not Standing.GOING:
-                    back = partial(other.claims.stands, party.session, before, taken_back=True)
-                    self.wire(party, other).append(back)
+                self.wire(party, other).append(partial(other.claims.stands, party.session, standing))
 
     def end(self, party: Party) -> None:
         self.parties.remove(party)
@@ -127,8 +123,6 @@ class Wires:
             last = [partial(other.claims.given_up, party.session)]
             if (said := self.standing.pop((party.session, other.session), None)) is not None:
                 last.append(partial(other.claims.answered, party.session, said, taken_back=True))
-            if party.standing is not Standing.GOING:
-                last.append(partial(other.claims.stands, party.session, party.standing, taken_back=True))
             self.dice.shuffle(last)  # who tells of the end of a session tells in any order what ends with it
             self.wire(party, other).extend(last)
 
