@@ -98,7 +98,7 @@ simulate: $(MADE)/develop ## the executor through faults, RUNS seeds on each cel
 	@set -e; for net in $(REHEARSED); do \
 		$(BIN)/firable rehearse $$net --seeds $(RUNS) --from $(FROM) --jobs $(JOBS); done
 
-explore: $(MADE)/develop ## the machines of the cells, each alone, held to the proof, those that end; CELLS names some
+explore: $(MADE)/develop ## the machines of the cells, each alone and to its end, held to the proof; CELLS names some
 	$(BIN)/python tests/explore_cells.py $(CELLS)
 	$(BIN)/pytest -n 0 tests/explore_alone.py
 

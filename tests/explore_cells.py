@@ -7,7 +7,7 @@ What may happen to a machine is said in `executor/simulation/alone.py` and `deci
 controllers to firings of the protocol net (`support/local_net_tie.py`); where a controller knows two rounds of one
 group, the net says nothing, and the acts are counted in the line of the machine. Parts are free of promise as bundles
 have them, and whatever is explored restarts as often as it likes. The exit status is 1 where a machine does not end, or
-an act is none of the proof's.
+an act is none of the proof's. Of what is out of reach nothing is claimed.
 
 It is no test of the suite, as it takes an hour of processors; the quick machines are (`test_alone.py`).
 """
@@ -39,10 +39,10 @@ from firable.nets.catalogue import catalogue_net
 from firable.nets.decomposition import Decomposition
 
 CELLS = ("one_robot", "two_robots_shared", "two_robots_separate", "two_cells")
-
-
-CONFIGURATIONS_MAX = 500_000
-"""None of the machines has as many."""
+OUT_OF_REACH = {("two_robots_shared", "robots")}
+"""One controller of two robots, of which either may be anywhere: what each has alone in `two_robots_separate`, multiplied."""
+CONFIGURATIONS_MAX = 100_000
+"""None of the others has as many."""
 
 
 def machines(decomposition: Decomposition) -> Iterator[tuple[str, Callable[[], OneMachine]]]:
@@ -75,11 +75,13 @@ def explored(cell: str, name: str) -> tuple[str, bool]:
 
 
 def main(cells: list[str]) -> int:
-    """Explore each machine of these cells, or of all, on all processors."""
+    """Explore each machine of these cells, or of all, on all processors, and name what is not."""
     known = [(cell, name) for cell in cells or CELLS for name, _ in machines(freed(split(catalogue_net(cell))))]
     status = 0
+    for cell, name in OUT_OF_REACH.intersection(known):
+        sys.stdout.write(f"{cell} {name}: not explored, out of reach\n")
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
-        for done in as_completed([pool.submit(explored, cell, name) for cell, name in known]):
+        for done in as_completed([pool.submit(explored, *one) for one in known if one not in OUT_OF_REACH]):
             words, is_well = done.result()
             sys.stdout.write(f"{words}\n")
             sys.stdout.flush()
