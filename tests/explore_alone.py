@@ -7,6 +7,7 @@ No test of the suite: its name is none that pytest collects by itself.
 
 from __future__ import annotations
 
+import pytest
 from support.alone_acts import Acts, alone, contained, decomposition_of, group_of
 from support.examples import FACTOR, FIRST_SEED
 from support.local_net_tie import LocalNetTie
@@ -59,6 +60,17 @@ def test_of_the_cell_every_act_is_some_actions_of_the_proof_whatever_arrives_and
     wander(Explorer(decomposition), Budget(losses=2, copies=2), FIRST_SEED, 400, among_all)
     assert len(among_all.found["system"]) > 5
     assert among_all.found["system"] <= by_itself.found["system"]
+
+
+@pytest.mark.parametrize(("name", "budget"), [("system", CRASH), ("robot", Budget()), ("mc", Budget())])
+def test_with_what_a_coordinator_has_closed_every_act_is_what_was_proved_and_all_there_is_is_explored(
+    name: str, budget: Budget
+) -> None:
+    """With any number of restarts of its own, or none."""
+    decomposition = decomposition_of("free one_robot")
+    tie = AloneTie(decomposition)
+    assert explore(Alone(decomposition, name, Reach(rounds=1, focus=TOP)), budget, watch=tie).complete
+    assert tie.actions["apply-free"] + tie.actions["apply"] > 0
 
 
 def test_of_a_group_of_the_cell_every_act_of_its_coordinator_is_some_actions_of_the_proof_with_any_restarts() -> None:

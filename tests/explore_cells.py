@@ -40,7 +40,7 @@ from firable.nets.decomposition import Decomposition
 
 CELLS = ("one_robot", "two_robots_shared", "two_robots_separate", "two_cells")
 OUT_OF_REACH = {("two_robots_shared", "robots")}
-"""One controller of two robots, of which either may be anywhere: what each has alone in `two_robots_separate`, multiplied."""
+"""One controller of two robots, of which either may be anywhere: what each has in `two_robots_separate`, multiplied."""
 CONFIGURATIONS_MAX = 100_000
 """None of the others has as many."""
 
