@@ -18,6 +18,8 @@ from typing import Final
 from firable.nets.diagnostics import Diagnostic, InputError, Span, did_you_mean
 
 EXCERPT_CHARACTERS_MAX: Final = 100
+_PASSWORD: Final = re.compile(r"""(\bpassword["']?\s*:\s*)("(?:[^"\\]|\\.)*"?|'[^']*'?|[^\s'"].*)""")
+"""A password in YAML or JSON; what is printed may go anywhere, into the log of a CI run most of all."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +35,9 @@ class Source:
         return tuple(self.text.replace("\r\n", "\n").replace("\r", "\n").split("\n"))
 
     def span(self, line: int, column: int, length: int = 1) -> Span:
-        """The span at a line and column (both from 1), with its excerpt."""
+        """The span at a line and column (both from 1), with its excerpt, in which no password is shown."""
         text = self.lines[line - 1] if 0 < line <= len(self.lines) else ""
+        text = _PASSWORD.sub(lambda found: found[1] + "*" * len(found[2]), text)
         start = 1
         if len(text) > EXCERPT_CHARACTERS_MAX:
             first = max(0, min(column - 1 - EXCERPT_CHARACTERS_MAX // 3, len(text) - EXCERPT_CHARACTERS_MAX))

@@ -7,6 +7,7 @@ import pytest
 
 from firable.nets.diagnostics import CODES, InputError
 from firable.nets.document_errors import version_problem
+from firable.nets.source import Source
 from firable.nets.text import SIZE_BYTES_MAX, parse_net, read_net
 
 HEAD = "firable: 1\ncell: c\n"
@@ -259,6 +260,22 @@ def test_repeated_use_of_one_wrong_name_tells_the_lines() -> None:
     assert problem.message == "there is no place 'p' (also on line 5, 6, 7)"
 
 
+@pytest.mark.parametrize(
+    ("line", "shown"),
+    [
+        ("  password: hunter2", "  password: *******"),
+        ("  d: {user: ann, password: hunter, 2}", "  d: {user: ann, password: **********"),
+        ('  "password" : "hun,t\\"r2", user: ann', '  "password" : ***********, user: ann'),
+        ("  password: 'hunter, 2' # his", "  password: *********** # his"),
+        ("  password: a, b}c # his", "  password: ************"),
+        ("  user: ann, passwords: 2", "  user: ann, passwords: 2"),
+    ],
+)
+def test_an_excerpt_shows_no_password_and_leaves_the_rest_in_its_place(line: str, shown: str) -> None:
+    span = Source("cell.bind.yaml", f"devices:\n{line}\n").span(2, 3)
+    assert span.excerpt == shown
+
+
 def test_the_excerpt_of_a_very_long_line_is_a_window_with_the_caret_in_place() -> None:
     with pytest.raises(InputError) as refused:
         parse_net(HEAD + "places: {" + "".join(f"p{i}: , " for i in range(5000)) + "'b d': }\n")
@@ -281,7 +298,6 @@ def test_a_quoted_word_is_a_name() -> None:
 
 
 def test_a_net_file_is_told_by_its_version() -> None:
-    from firable.nets.source import Source
     from firable.nets.yaml_tree import parse_tree
 
     source = Source("f", HEAD)
