@@ -20,6 +20,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from functools import partial
+from typing import Final
 
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
@@ -40,6 +41,9 @@ from firable.executor.simulation.snapshots import clone
 from firable.executor.simulation.surroundings import Reach, Surroundings
 from firable.nets.decomposition import Decomposition
 
+PASSING_MAX: Final = 100_000
+"""So many machines are remembered beside those of configurations: some gibibytes; what they do is done anew then."""
+
 
 class OneMachine(Explorer, ABC):
     """Explores one machine of a decomposition; the other machines of its configurations are those of the start."""
@@ -56,17 +60,27 @@ class OneMachine(Explorer, ABC):
         self.which = self.names.index(name)
         self.budget: Budget | None = None
         self.spread = _Spread(self.coordinators)
+        self.reached: set[int] = set()
+        """The machines of configurations; all others are only met between two of them."""
+        self.passing_max = PASSING_MAX
         self.choices: dict[int, list[int]] = {}
         self.recounted: dict[tuple[int, frozenset[Job]], tuple[int, frozenset[Job]]] = {}
 
     def steps(self, at: Configuration) -> Iterator[tuple[Step, Configuration]]:
         """Everything that may happen to the machine, and where it leads."""
+        self.reached.update(at.machines)
+        if len(self.machines) > len(self.reached) + self.passing_max:
+            self.forget_but(self.reached)
+            self.choices.clear()
+            self.recounted.clear()
         for step, after in self.happenings(at):
             number = after.machines[self.which]
             if (known := self.choices.get(number)) is None:
                 known = self.choices[number] = list(self.likened(number))
             for left in known:
-                yield step, after if left == number else self.counted(self.at(left, after, after.jobs))
+                found = after if left == number else self.counted(self.at(left, after, after.jobs))
+                self.reached.add(found.machines[self.which])
+                yield step, found
 
     @abstractmethod
     def happenings(self, at: Configuration) -> Iterator[tuple[Step, Configuration]]:

@@ -7,7 +7,7 @@ counted from the beginning (`numbering`), so that there are only so many.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Collection, Hashable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, Final
@@ -119,7 +119,9 @@ class Repertoire:
         self.owner_of = {s.name: self.names.index(n.name) for n in decomposition.subnets for s in n.signals}
         sensors = [signal.name for signal in self.net.signals if signal.kind is SignalKind.SENSOR]
         self.sensors = tuple(sensors) if senses else ()
-        self.machines: list[Stored] = []
+        self.machines: dict[int, Stored] = {}
+        self.met = 0
+        """So many were met, those that are forgotten included."""
         self.numbered: dict[Hashable, int] = {}
         self.acts: dict[Hashable, tuple[int, tuple[Effect, ...]]] = {}
         self.found: dict[object, dict[Kind, set[int]]] = {}
@@ -136,9 +138,20 @@ class Repertoire:
     def _number(self, machine: LocalController | Coordinator, kept: Kept) -> int:
         key = (type(machine), frozen(machine), frozen(sorted(kept.items(), key=lambda item: item[0])))
         if (number := self.numbered.get(key)) is None:
-            number = self.numbered[key] = len(self.machines)
-            self.machines.append(Stored(machine, kept))
+            number = self.numbered[key] = self.met
+            self.machines[number] = Stored(machine, kept)
+            self.met += 1
         return number
+
+    def forget_but(self, numbers: Collection[int]) -> None:
+        """Forget all machines but these, and what was found out of any: it is found out again where it is wanted."""
+        self.machines = {number: self.machines[number] for number in numbers}
+        self.numbered = {key: number for key, number in self.numbered.items() if number in self.machines}
+        self.acts.clear()
+        self.found.clear()
+        self.mentioned.clear()
+        self.mentions.clear()
+        self.rankings.clear()
 
     def act(self, number: int, key: Hashable, act: Act) -> tuple[int, tuple[Effect, ...]]:
         """The machine that an act makes of one, and its effects; `key` names the act."""

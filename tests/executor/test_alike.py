@@ -91,6 +91,18 @@ def test_whatever_arrives_a_coordinator_does_not_tell_controllers_apart_that_tak
     assert hold_alike(explorer) > 1000
 
 
+def test_whatever_is_forgotten_between_configurations_is_found_out_again() -> None:
+    decomposition = decomposition_of("one_robot")
+    spaces, met = [], []
+    for most in (10, 1_000_000):
+        explorer = Deciding(decomposition, TOP, group_of(decomposition, "G4"))
+        explorer.passing_max = most
+        spaces.append(explore(explorer, CRASH))
+        met.append(explorer.met)
+    assert spaces[0] == spaces[1]
+    assert met[0] > met[1], "what was forgotten is met again"
+
+
 def test_a_coordinator_that_prefers_a_controller_is_found() -> None:
     class Prefers(Coordinator):
         def receive(self, message: ToCoordinator) -> list[Effect]:
