@@ -17,6 +17,7 @@ def free_port() -> int:
     some time (TCP knows a simultaneous open), hears what he has said, and keeps the port from whom it was meant for.
     """
     for port in random.SystemRandom().sample(range(_DEALT // 2, _DEALT), 1000):
-        with suppress(OSError), socket.create_server(("127.0.0.1", port)):
+        with suppress(OSError), socket.socket() as probe:
+            probe.bind(("127.0.0.1", port))  # nor is it still kept by a connection that is over
             return port
     raise OSError(f"no port of this host between {_DEALT // 2} and {_DEALT} is free")
