@@ -41,8 +41,8 @@ from firable.executor.simulation.snapshots import clone
 from firable.executor.simulation.surroundings import Reach, Surroundings
 from firable.nets.decomposition import Decomposition
 
-PASSING_MAX: Final = 100_000
-"""So many machines are remembered beside those of configurations: some gibibytes; what they do is done anew then."""
+PASSING_MAX: Final = 20_000
+"""So many machines are remembered beside those of configurations: about two gibibytes; what they do is done anew then."""
 
 
 class OneMachine(Explorer, ABC):
