@@ -42,7 +42,7 @@ from firable.executor.simulation.surroundings import Reach, Surroundings
 from firable.nets.decomposition import Decomposition
 
 PASSING_MAX: Final = 20_000
-"""So many machines are remembered beside those of configurations: about two gibibytes; what they do is done anew then."""
+"""So many are remembered beside those of configurations, in about two gibibytes; what they do is done anew then."""
 
 
 class OneMachine(Explorer, ABC):
