@@ -22,11 +22,11 @@ arbiter decides behind each last one); what was heard last, and of whom in this 
 how often it has restarted. Nor is it told apart which of several controllers is known for what, where they take part in
 the same transitions in the same way, nor who voted first (symmetry: Emerson and Sistla, Formal Methods in System Design
 9, 1996). Names are keys to a coordinator, and no more; tests hold what follows from each message to what follows with
-two of them exchanged.
-Other groups tell such controllers apart, so that a comparison in a setting is made for one order of them.
+two of them exchanged. Other groups tell such controllers apart, so that a comparison in a setting is made for one order
+of them.
 
-Rejected: all groups at once, which is all interleavings of independent rounds again; and
-to let a coordinator hear only what controllers told in runs, which are some.
+Rejected: all groups at once, which is all interleavings of independent rounds again; and to let a coordinator hear only
+what controllers told in runs, which are some.
 """
 
 from __future__ import annotations

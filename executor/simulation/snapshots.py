@@ -12,6 +12,7 @@ from collections.abc import Callable, Hashable
 from copy import copy
 from dataclasses import fields, is_dataclass
 from enum import Enum
+from functools import cache
 from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
@@ -40,21 +41,16 @@ def clone(value: T) -> T:
 
 def frozen(value: Any) -> Hashable:
     """A value that is equal for two machines iff all that can change in them is."""
-    of = value.__class__
-    if of not in _FREEZERS:
-        _FREEZERS[of] = _freezer(of)
-    freezer = _FREEZERS[of]
-    return value if freezer is None else freezer(value)
+    found: Hashable = _freezer(value.__class__)(value)
+    return found
 
 
 def _cloned(value: Any) -> Any:
-    of = value.__class__
-    if of not in _COPIERS:
-        _COPIERS[of] = _copier(of)
-    copier = _COPIERS[of]
+    copier = _copier(value.__class__)
     return value if copier is None else copier(value)
 
 
+@cache
 def _copier(of: type) -> Callable[[Any], Any] | None:
     """How values of a type are copied; None where they never change."""
     if issubclass(of, (*_SIMPLE, *_FIXED)) or _is_frozen(of):
@@ -73,19 +69,19 @@ def _copier(of: type) -> Callable[[Any], Any] | None:
 
 
 def _copy_of_tuple(value: tuple[Any, ...]) -> tuple[Any, ...]:
-    made = [_cloned(each) for each in value]
-    for each, its in zip(value, made, strict=True):
-        if each is not its:
-            return tuple(made)
-    return value
+    return value if all(_copier(each.__class__) is None for each in value) else tuple(map(_cloned, value))
 
 
 def _copy_of_dict(value: dict[Any, Any]) -> dict[Any, Any]:
-    return {key: _cloned(each) for key, each in value.items()}
+    made = value.copy()
+    for key, each in value.items():
+        if (copier := _copier(each.__class__)) is not None:
+            made[key] = copier(each)
+    return made
 
 
 def _copy_of_list(value: list[Any]) -> list[Any]:
-    return [_cloned(each) for each in value]
+    return list(map(_cloned, value))
 
 
 def _copy_of_machine(value: Any) -> Any:
@@ -94,28 +90,25 @@ def _copy_of_machine(value: Any) -> Any:
     return made
 
 
-def _freezer(of: type) -> Callable[[Any], Hashable] | None:
-    """What values of a type are compared by; None where by themselves."""
+@cache
+def _freezer(of: type) -> Callable[[Any], Hashable]:
+    """What values of a type are compared by."""
     if issubclass(of, (*_FIXED, _DERIVED)):
         return lambda _: None
     if issubclass(of, _SIMPLE) or _is_frozen(of):
-        return None
+        return lambda value: value
     if issubclass(of, tuple | list):
-        return lambda value: tuple([frozen(each) for each in value])
+        return lambda value: tuple(map(frozen, value))
     if issubclass(of, dict):
-        return lambda value: tuple([(key, frozen(each)) for key, each in value.items()])
+        return lambda value: tuple((key, frozen(each)) for key, each in value.items())
     if issubclass(of, set):
         return frozenset
     if is_dataclass(of):
         names = _names(of)
-        return lambda value: tuple([frozen(getattr(value, name)) for name in names])
+        return lambda value: tuple(frozen(getattr(value, name)) for name in names)
     if issubclass(of, _CHANGING):
-        return lambda value: tuple([frozen(each) for each in vars(value).values()])
+        return lambda value: tuple(map(frozen, vars(value).values()))
     raise TypeError(f"a machine holds a {of.__name__}, which is not known here")
-
-
-_COPIERS: Final[dict[type, Callable[[Any], Any] | None]] = {}
-_FREEZERS: Final[dict[type, Callable[[Any], Hashable] | None]] = {}
 
 
 def _is_frozen(of: type) -> bool:

@@ -55,7 +55,7 @@ def said(effects: list[Effect], one: str = "", other: str = "") -> set[Effect]:
 def met(explorer: Deciding) -> Iterator[tuple[Coordinator, ToCoordinator]]:
     """Coordinators that an exploration has met, with nothing of other groups, and everything that may arrive."""
     assert explore(explorer, CRASH).complete
-    for number in sorted({number for likened in explorer.choices.values() for number in likened}):
+    for number in sorted(n for n in explorer.reached if isinstance(explorer.machine(n), Coordinator)):
         machine = explorer.coordinator(explorer.spread_out(number))
         for message in explorer.hearing.messages(machine):
             yield machine, message
