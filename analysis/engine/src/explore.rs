@@ -5,7 +5,8 @@
 //! markings of one level are taken together and turned into bit slices, one word for each place; a transition is then
 //! tested for all of them by one word operation for each place it touches, and contact and deadlock are read off the
 //! same words. Batches end at the end of a level: a batch across levels would number a successor of the later
-//! level before one of the earlier, and paths would no longer be shortest.
+//! level before one of the earlier, and paths would no longer be shortest. Every firing is counted, but only those are looked up
+//! that may lead to a new marking: where independent firings meet again, one order of them is enough (`sleep.rs`).
 //!
 //! Rejected: enabledness kept incrementally from the parent marking (it lost to bit slices everywhere it was measured);
 //! storing edges (they are recomputed faster than they are read back, and cost more than the markings); storing
@@ -23,6 +24,7 @@ use crate::known::{Arrivals, ByKey, Hashed, Set};
 use crate::marking::{Dynamic, Width, holds};
 use crate::net::{Net, Rules};
 use crate::pair::{MEASURED, Pair, Shared};
+use crate::sleep::{Asleep, Sleep, Trail};
 use crate::step::{Components, Steps};
 use crate::table::{NONE, Table};
 use crate::with_width;
@@ -194,18 +196,39 @@ impl Space {
         max: usize,
         watch: &mut Watch<'_>,
     ) -> Result<(), Stop> {
-        let mut batch = Batch::new(net);
+        let sleep = Sleep::new(net, &self.memory);
+        let mut trail = Trail::default();
+        let result = self.run_levels(width, net, arrivals, (&sleep, &mut trail), pair, max, watch);
+        trail.leave(&self.memory);
+        self.memory.release(sleep.bytes());
+        result
+    }
+
+    #[inline(always)]
+    fn run_levels<W: Width>(
+        &mut self,
+        width: W,
+        net: &Net,
+        arrivals: &mut impl Shared<W>,
+        (sleep, trail): (&Sleep, &mut Trail),
+        pair: &mut Option<Pair>,
+        max: usize,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), Stop> {
+        let (mut batch, mut asleep) = (Batch::new(net), Asleep::new(sleep));
         batch.markings.extend_from_slice(&net.initial);
-        arrivals.first(width, &mut batch, (&mut self.table, max, &self.memory, watch))?;
+        arrivals.first(width, &mut batch, (&mut self.table, trail, max, &self.memory, watch))?;
         let (mut next, mut end) = (0, 1);
         while self.level_end(next, &mut end)? {
+            trail.forget(next);
             let open;
             (open, end) = match pair.as_mut().filter(|pair| pair.takes(end - next, end)) {
-                Some(pair) => pair.expand(width, self, arrivals, next, max, watch)?,
+                Some(pair) => pair.expand(width, self, arrivals, (sleep, &mut *trail), next, max, watch)?,
                 None => (vec![(next, end)], end),
             };
             for range in open {
-                self.expand(width, net, range, (&mut batch, arrivals), max, watch)?;
+                let with = (&mut batch, &mut *arrivals, sleep, &mut asleep, &mut *trail);
+                self.expand(width, net, range, with, max, watch)?;
             }
             next = end;
         }
@@ -218,7 +241,7 @@ impl Space {
         width: W,
         net: &Net,
         (first, end): (usize, usize),
-        (batch, arrivals): (&mut Batch, &mut impl Arrivals<W>),
+        (batch, arrivals, sleep, asleep, trail): (&mut Batch, &mut impl Arrivals<W>, &Sleep, &mut Asleep, &mut Trail),
         max: usize,
         watch: &mut Watch<'_>,
     ) -> Result<(), Stop> {
@@ -228,6 +251,7 @@ impl Space {
             batch.markings.clear();
             self.table.store.copy_range(next, stop, &mut batch.markings);
             arrivals.cut(width, batch);
+            asleep.cut(trail.of(next, stop));
             let mut alive = 0;
             let before = self.edges;
             for t in 0..net.transitions.len() {
@@ -246,10 +270,11 @@ impl Space {
                 let edges = u64::from(fire.count_ones());
                 self.fired[t] += edges;
                 self.edges += edges;
-                arrivals.push(width, net, batch, t, fire, (&mut self.table, max, &self.memory, watch))?;
+                let awake = fire & !asleep.of(sleep, t);
+                arrivals.push(width, net, batch, t, awake, (&mut self.table, trail, max, &self.memory, watch))?;
             }
             self.note_deadlocks(next, batch.valid & !alive)?;
-            arrivals.end(width, net, batch, stop == end, (&mut self.table, max, &self.memory, watch))?;
+            arrivals.end(width, net, batch, stop == end, (&mut self.table, trail, max, &self.memory, watch))?;
             watch.found = Found { markings: self.table.store.len() as u64, edges: self.edges };
             watch.tick((stop - next) + (self.edges - before) as usize + net.transitions.len())?;
             next = stop;

@@ -100,7 +100,7 @@ impl<'a> Fan<'a> {
             }
             match self.space.set.span() {
                 None => {
-                    self.candidates.push(width, &self.batch, fire, net.flip(t, words), net.flip_hashes[t]);
+                    self.candidates.push(width, &self.batch, fire, (net.flip(t, words), net.flip_hashes[t]), 0);
                     while fire != 0 {
                         self.edges.push((fire.trailing_zeros() as u8, t as u32));
                         fire &= fire - 1;

@@ -22,6 +22,7 @@ use crate::marking::{Width, linear_hash};
 use crate::net::Net;
 use crate::pair::Sides;
 use crate::seat::Slot;
+use crate::sleep::{Trail, last};
 use crate::span::Span;
 use crate::spread::Spread;
 use crate::table::{Candidates, Table};
@@ -88,7 +89,7 @@ impl<S: Slot> Keyed<S> {
 }
 
 /// Candidates on their way from firing transitions into the set.
-pub trait Arrivals<W: Width> {
+pub(crate) trait Arrivals<W: Width> {
     /// Puts M0, all that is in the batch, into the empty set.
     fn first(&mut self, width: W, batch: &mut Batch, into: Into<'_, '_>) -> Result<(), Stop>;
 
@@ -103,8 +104,8 @@ pub trait Arrivals<W: Width> {
     fn end(&mut self, width: W, net: &Net, batch: &Batch, level: bool, into: Into<'_, '_>) -> Result<(), Stop>;
 }
 
-/// Where new markings go, how many there may be, of what memory, and until when.
-pub type Into<'a, 'b> = (&'a mut Table, usize, &'a Memory, &'a mut Watch<'b>);
+/// Where new markings go and what they say, how many there may be, of what memory, and until when.
+pub(crate) type Into<'a, 'b> = (&'a mut Table, &'a mut Trail, usize, &'a Memory, &'a mut Watch<'b>);
 
 /// Arrivals told by their hash.
 pub struct Hashed(Candidates);
@@ -117,15 +118,15 @@ impl Hashed {
 
     #[inline(always)]
     fn settle<W: Width>(&mut self, width: W, into: Into<'_, '_>) -> Result<(), Stop> {
-        let (table, max, memory, watch) = into;
+        let (table, trail, max, memory, watch) = into;
         table.make_room(width, self.0.len(), memory, watch)?;
-        table.insert_batch(width, &mut self.0, max, memory)
+        table.insert_batch(width, &mut self.0, trail, max, memory)
     }
 }
 
 impl<W: Width> Arrivals<W> for Hashed {
     fn first(&mut self, width: W, batch: &mut Batch, into: Into<'_, '_>) -> Result<(), Stop> {
-        let (table, max, memory, _) = into;
+        let (table, _, max, memory, _) = into;
         table.insert(width, &batch.markings, linear_hash(width, &batch.markings), max, memory)?;
         Ok(())
     }
@@ -145,7 +146,7 @@ impl<W: Width> Arrivals<W> for Hashed {
         fire: u64,
         into: Into<'_, '_>,
     ) -> Result<(), Stop> {
-        if self.0.push(width, batch, fire, net.flip(t, width.words()), net.flip_hashes[t]) {
+        if self.0.push(width, batch, fire, (net.flip(t, width.words()), net.flip_hashes[t]), last(t)) {
             self.settle(width, into)?;
         }
         Ok(())
@@ -177,10 +178,11 @@ impl<'a, S: Slot> ByKey<'a, S> {
     /// Looks up what came, and appends what is new.
     #[inline(always)]
     fn settle<W: Width>(&mut self, width: W, net: &Net, batch: &Batch, into: Into<'_, '_>) -> Result<(), Stop> {
-        let (table, max, memory, watch) = into;
+        let (table, trail, max, memory, watch) = into;
         let (words, exact) = (width.words(), &mut self.keyed.exact);
         let open = exact.first_look(&mut self.asked);
         let (mut done, made, flips) = (0, &self.made, &net.flips);
+        let (mut lasts, mut found) = ([0; ROOM], 0);
         while done < open {
             let mut room = table.store.room(open - done, max).chunks_exact_mut(words);
             let (all, mut is_full) = (room.len(), false);
@@ -194,6 +196,8 @@ impl<'a, S: Slot> ByKey<'a, S> {
                 for k in 0..words {
                     to[k] = from[k] ^ flip[k];
                 }
+                lasts[found % ROOM] = last(t);
+                found += 1;
                 Ok(())
             });
             let new = all - room.len();
@@ -204,13 +208,14 @@ impl<'a, S: Slot> ByKey<'a, S> {
                 end?;
             }
         }
+        trail.append(table.store.len() - found, &lasts[..found], memory);
         exact.answered(&mut self.asked, memory, watch)
     }
 }
 
 impl<W: Width, S: Slot> Arrivals<W> for ByKey<'_, S> {
     fn first(&mut self, width: W, batch: &mut Batch, into: Into<'_, '_>) -> Result<(), Stop> {
-        let (table, max, memory, watch) = into;
+        let (table, _, max, memory, watch) = into;
         let key = self.keyed.span.key(&batch.markings);
         self.keyed.exact.ask(&mut self.asked, 1, |_| key, |_, _| ());
         let open = self.keyed.exact.first_look(&mut self.asked);

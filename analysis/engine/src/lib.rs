@@ -57,6 +57,8 @@ pub mod scc;
 #[forbid(unsafe_code)]
 pub mod seat;
 #[forbid(unsafe_code)]
+mod sleep;
+#[forbid(unsafe_code)]
 pub mod span;
 #[forbid(unsafe_code)]
 mod spread;

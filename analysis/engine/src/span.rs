@@ -74,6 +74,26 @@ impl Span {
         keys.iter_mut().for_each(|key| *key = self.scramble(*key));
     }
 
+    /// What stands above a key in one word with it: by which transition its marking was found (`sleep.rs`), if there is room
+    /// for its number.
+    #[inline(always)]
+    pub(crate) fn told(&self, last: u16) -> u64 {
+        let above = u64::from(last) << self.bits;
+        if above >> self.bits == u64::from(last) { above } else { 0 }
+    }
+
+    /// The key in such a word.
+    #[inline(always)]
+    pub(crate) fn key_in(&self, word: u64) -> u64 {
+        word & ((1 << self.bits) - 1)
+    }
+
+    /// By which transition the marking of such a word was found.
+    #[inline(always)]
+    pub(crate) fn last_in(&self, word: u64) -> u16 {
+        (word >> self.bits) as u16
+    }
+
     /// A linear bijection of keys that lets no bit stay alone, so that one product (`exact.rs`) spreads them.
     #[inline(always)]
     fn scramble(&self, mut key: u64) -> u64 {

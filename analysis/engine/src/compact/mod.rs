@@ -27,6 +27,7 @@ use crate::exact::{Asked, Exact, ROOM};
 use crate::marking::Width;
 use crate::net::Net;
 use crate::seat::Slot;
+use crate::sleep::{Asleep, Sleep, last};
 use crate::span::Span;
 use crate::spread::Spread;
 use crate::stubborn::formula::Formula;
@@ -146,10 +147,13 @@ struct Sweep<S> {
     memory: Memory,
     exact: Exact<S>,
     asked: Box<Asked<S>>,
-    /// The keys asked for, and the origins that they have.
+    /// What need not be asked for.
+    sleep: Sleep,
+    asleep: Asleep,
+    /// The keys asked for, with the transition that leads there, and the origins that they have.
     keys: [u64; ROOM],
     origins: [u64; ROOM],
-    /// The keys of the next level, and their origins where they are asked for.
+    /// The keys of the next level, with the transition that they were found by, and their origins where they are asked for.
     next: [Queue; 2],
     spare: Spare,
 }
@@ -174,7 +178,10 @@ impl<S: Slot> Sweep<S> {
                 return swept;
             }
         };
+        let sleep = Sleep::new(&of.net, &memory);
         let mut sweep = Sweep {
+            asleep: Asleep::new(&sleep),
+            sleep,
             memory,
             exact,
             asked: Box::default(),
@@ -199,10 +206,11 @@ impl<S: Slot> Sweep<S> {
     ) -> Result<(), Stop> {
         (self.keys[0], self.origins[0]) = (plan.from, plan.from);
         self.exact.ask(&mut self.asked, 1, |_| plan.from, |_, _| ());
-        self.settle(plan, 0, swept, watch)?;
+        self.settle(of, plan, 0, swept, watch)?;
         let mut batch = Batch::new(&of.net);
         let (mut kept, mut marking) = (0, vec![0; width.words()]);
         let (mut keys, mut origins) = (Vec::with_capacity(64), Vec::with_capacity(64));
+        let mut lasts = Vec::with_capacity(64);
         loop {
             let [mut now, mut marked] = std::mem::take(&mut self.next);
             if now.len() == 0 || swept.target.is_some() {
@@ -219,6 +227,10 @@ impl<S: Slot> Sweep<S> {
             while now.len() > 0 {
                 now.take(&mut keys, &mut self.spare);
                 marked.take(&mut origins, &mut self.spare);
+                lasts.clear();
+                lasts.extend(keys.iter().map(|&told| of.span.last_in(told)));
+                keys.iter_mut().for_each(|told| *told = of.span.key_in(*told));
+                self.asleep.cut(&lasts);
                 if kept <= plan.keep {
                     swept.levels.last_mut().into_iter().for_each(|level| level.extend_from_slice(&keys));
                 }
@@ -237,7 +249,7 @@ impl<S: Slot> Sweep<S> {
                 watch.found = Found { markings: self.exact.len() as u64, edges: outcome.found.edges };
                 watch.tick(64 + of.net.transitions.len() + 4 * keys.len())?;
             }
-            self.settle(plan, level + 1, swept, watch)?;
+            self.settle(of, plan, level + 1, swept, watch)?;
         }
     }
 
@@ -283,22 +295,23 @@ impl<S: Slot> Sweep<S> {
             let edges = u64::from(fire.count_ones());
             swept.outcome.fired[t] += edges;
             swept.outcome.found.edges += edges;
-            let flip = of.span.flips[t];
+            let (flip, told) = (of.span.flips[t], of.span.told(last(t)));
+            let awake = fire & !self.asleep.of(&self.sleep, t);
             let (keys, origins) = (&mut self.keys, &mut self.origins);
             let from = plan.mark.is_some_and(|mark| level >= mark);
             self.exact.ask(
                 &mut self.asked,
-                fire,
+                awake,
                 |j| batch.hashes[j] ^ flip,
                 |c, j| {
-                    keys[c] = batch.hashes[j as usize] ^ flip;
+                    keys[c] = batch.hashes[j as usize] ^ flip | told;
                     if from {
                         origins[c] = marked[j as usize];
                     }
                 },
             );
             if self.asked.count >= ROOM - 64 {
-                self.settle(plan, level + 1, swept, watch)?;
+                self.settle(of, plan, level + 1, swept, watch)?;
             }
         }
         let dead = batch.valid & !alive;
@@ -314,12 +327,19 @@ impl<S: Slot> Sweep<S> {
 
     /// Looks up what was asked for; what is new belongs to a level.
     #[inline(always)]
-    fn settle(&mut self, plan: Plan, level: usize, swept: &mut Swept, watch: &mut Watch<'_>) -> Result<(), Stop> {
+    fn settle(
+        &mut self,
+        of: &Compact,
+        plan: Plan,
+        level: usize,
+        swept: &mut Swept,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), Stop> {
         let (keys, origins, spare, memory) = (&self.keys, &self.origins, &mut self.spare, &self.memory);
         let [next, marks] = &mut self.next;
         self.exact.put_all(&mut self.asked, memory, watch, |c| {
-            let key = keys[c];
-            next.push(key, spare, memory)?;
+            next.push(keys[c], spare, memory)?;
+            let key = of.span.key_in(keys[c]);
             let origin = match plan.mark {
                 Some(mark) if level > mark => origins[c],
                 _ => key,

@@ -9,6 +9,7 @@ use crate::explore::Space;
 use crate::known::Arrivals;
 use crate::marking::Width;
 use crate::net::Net;
+use crate::sleep::Trail;
 use crate::store::Store;
 use crate::table::Table;
 
@@ -36,6 +37,8 @@ pub(crate) struct Finds {
     pub(crate) memory: Memory,
     /// The markings.
     pub(crate) fresh: Store,
+    /// By which transitions those of the last two levels were found, by their place among the finds.
+    pub(crate) trail: Trail,
     /// How many of them it found in each level.
     pub(crate) levels: Vec<usize>,
     /// How many there may be.
@@ -54,6 +57,7 @@ impl Finds {
             id,
             memory: Memory::new(0),
             fresh: Store::new(words),
+            trail: Trail::default(),
             levels: Vec::new(),
             most: 0,
             left: Vec::new(),

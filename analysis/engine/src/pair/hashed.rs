@@ -1,4 +1,5 @@
-//! The halves of a table of hashes: a record is a marking, before it its mixed hash where that takes work.
+//! The halves of a table of hashes: a record is a marking, before it its mixed hash where that takes work, and after it by
+//! which transition it was found (`sleep.rs`).
 //!
 //! A slot says an index, so the threads number what they find while they find it. A thread numbers its i-th find of a
 //! level as if both found equally many, 64 in turn; at the end only those by which one has found more than the other are
@@ -16,6 +17,7 @@ use crate::known::Hashed;
 use crate::marking::{Width, linear_hash, mix};
 use crate::net::Net;
 use crate::region::write_first;
+use crate::sleep::last;
 use crate::store::Store;
 use crate::table::{Shape, Table};
 
@@ -50,7 +52,7 @@ fn place(number: usize) -> usize {
 
 #[inline(always)]
 fn stride<W: Width>(width: W) -> usize {
-    if width.words() == 1 { 1 } else { width.words() + 1 }
+    if width.words() == 1 { 2 } else { width.words() + 2 }
 }
 
 /// The mixed hash of a record, and its marking.
@@ -124,6 +126,7 @@ impl HashedHalf<'_> {
                 } else if i >= finds.most || finds.fresh.push(width, marking, finds.most, &finds.memory).is_err() {
                     finds.end(End::Short);
                 } else {
+                    finds.trail.append(i, &[record[record.len() - 1] as u16], &finds.memory);
                     self.slots[at] = shape.slot(mixed, index);
                     return;
                 }
@@ -193,7 +196,7 @@ impl<W: Width> Half<W> for HashedHalf<'_> {
     #[inline(always)]
     fn push(&mut self, width: W, net: &Net, batch: &Batch, t: usize, fire: u64, to: To<'_, '_>) {
         let (words, stride) = (width.words(), stride(width));
-        let (flip, flip_hash) = (&net.flip(t, words)[..words], net.flip_hashes[t]);
+        let (flip, flip_hash, last) = (&net.flip(t, words)[..words], net.flip_hashes[t], u64::from(last(t)));
         if self.mine.len() < self.waiting + 64 * stride {
             self.mine.resize(self.waiting + 64 * stride, 0);
         }
@@ -212,9 +215,10 @@ impl<W: Width> Half<W> for HashedHalf<'_> {
             }
             for k in 0..words {
                 let word = from[k] ^ flip[k];
-                to[stride - words + k] = word;
-                copy[stride - words + k] = word;
+                to[stride - 1 - words + k] = word;
+                copy[stride - 1 - words + k] = word;
             }
+            (to[stride - 1], copy[stride - 1]) = (last, last);
             let is_theirs = (mixed >> 63) as usize ^ self.id;
             a += stride * (1 - is_theirs);
             b += stride * is_theirs;

@@ -25,6 +25,7 @@ use crate::known::ByKey;
 use crate::marking::Width;
 use crate::net::Net;
 use crate::seat::Slot;
+use crate::sleep::last;
 use crate::span::Span;
 use crate::spread::Spread;
 use crate::store::Store;
@@ -76,12 +77,12 @@ impl<W: Width, S: Slot> Half<W> for KeyedHalf<'_, S> {
 
     #[inline(always)]
     fn push(&mut self, width: W, net: &Net, batch: &Batch, t: usize, fire: u64, to: To<'_, '_>) {
-        let (flip, made) = (self.span.flips[t], (t as u32) << 6);
+        let (flip, made, told) = (self.span.flips[t], (t as u32) << 6, self.span.told(last(t)));
         let staying = if self.parting.crosses[t] { !self.here } else { self.here };
         let mut rest = fire & !staying;
         let (theirs, len) = to.theirs;
         while rest != 0 {
-            theirs[*len] = batch.hashes[rest.trailing_zeros() as usize] ^ flip;
+            theirs[*len] = batch.hashes[rest.trailing_zeros() as usize] ^ flip | told;
             *len += 1;
             rest &= rest - 1;
         }
@@ -113,12 +114,16 @@ impl<W: Width, S: Slot> Half<W> for KeyedHalf<'_, S> {
 
     #[inline(always)]
     fn insert(&mut self, width: W, records: &[u64], finds: &mut Finds, watch: &mut Watch<'_>) {
-        let (table, asked, spread) = (made_before(self.table), &mut self.asked, self.spread);
+        let (table, asked) = (made_before(self.table), &mut self.asked);
+        let (span, spread) = (self.span, self.spread);
         for keys in records.chunks(ROOM) {
             for some in keys.chunks(64) {
-                table.ask(asked, !0 >> (64 - some.len()), |j| some[j], |_, _| ());
+                table.ask(asked, !0 >> (64 - some.len()), |j| span.key_in(some[j]), |_, _| ());
             }
-            take(width, (table, asked), finds, watch, |c, marking| spread.marking(keys[c], marking));
+            take(width, (table, asked), finds, watch, |c, marking| {
+                spread.marking(span.key_in(keys[c]), marking);
+                span.last_in(keys[c])
+            });
         }
     }
 }
@@ -134,11 +139,12 @@ impl<S: Slot> KeyedHalf<'_, S> {
             for k in 0..words {
                 marking[k] = from[k] ^ flip[k];
             }
+            last(t)
         });
     }
 }
 
-/// Looks up what is asked of a table, and takes what is new, each marking made of its number; then nothing is asked any
+/// Looks up what is asked of a table, and takes what is new, each marking, and what it says, made of its number; then nothing is asked any
 /// more. Once something found no room, nothing new goes into the table, and what is new is left over.
 #[inline(always)]
 fn take<W: Width, S: Slot>(
@@ -146,9 +152,10 @@ fn take<W: Width, S: Slot>(
     (table, asked): (&mut Exact<S>, &mut Asked<S>),
     finds: &mut Finds,
     watch: &mut Watch<'_>,
-    make: impl Fn(usize, &mut [u64]),
+    make: impl Fn(usize, &mut [u64]) -> u16,
 ) {
     let (open, mut done) = (table.first_look(asked), 0);
+    let (mut lasts, mut found) = ([0; ROOM], 0);
     while done < open {
         let mut room = finds.fresh.room(open - done, finds.most).chunks_exact_mut(width.words());
         let (all, mut is_full) = (room.len(), false);
@@ -157,7 +164,8 @@ fn take<W: Width, S: Slot>(
                 is_full = true;
                 return Err(Stop::Memory);
             };
-            make(c, to);
+            lasts[found % ROOM] = make(c, to);
+            found += 1;
             Ok(())
         });
         let new = all - room.len();
@@ -175,6 +183,7 @@ fn take<W: Width, S: Slot>(
             done += 1;
         }
     }
+    finds.trail.append(finds.fresh.len() - found, &lasts[..found], &finds.memory);
     if let Err(stop) = table.answered(asked, &finds.memory, watch) {
         finds.close(stop);
     }

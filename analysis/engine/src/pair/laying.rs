@@ -10,6 +10,7 @@ use std::thread;
 use super::half::{BLOCK, Finds};
 use crate::budget::Stop;
 use crate::explore::Space;
+use crate::sleep::Trail;
 
 /// Bytes from which a second thread is worth its start.
 const BOTH_BYTES: usize = if cfg!(test) { 1 << 12 } else { 1 << 20 };
@@ -38,9 +39,38 @@ fn lay(finds: [&Finds; 2], words: usize, skip: usize, into: &mut [u64]) {
     }
 }
 
-/// Appends to the array the finds of each level; where the last of these levels begins, if there are several. Without
-/// memory for all, as many as there is memory for.
-pub(super) fn append(space: &mut Space, finds: [&Finds; 2], max: usize) -> Result<Option<usize>, Stop> {
+/// Appends to the array the finds of each level, and to the trail what those of the last two say; where the last of these
+/// levels begins, if there are several. Without memory for all, as many as there is memory for.
+pub(super) fn append(
+    space: &mut Space,
+    finds: [&Finds; 2],
+    trail: &mut Trail,
+    max: usize,
+) -> Result<Option<usize>, Stop> {
+    let last = append_markings(space, finds, max)?;
+    append_trail(space, finds, trail);
+    Ok(last)
+}
+
+/// What the finds of the last two levels say: of the one that was expanded, and of what follows it.
+fn append_trail(space: &Space, finds: [&Finds; 2], trail: &mut Trail) {
+    let tail = |of: &Finds| of.levels[of.levels.len().saturating_sub(2)..].to_vec();
+    let levels = finds.map(tail);
+    let mut from = [0, 1].map(|id| finds[id].fresh.len() - levels[id].iter().sum::<usize>());
+    let mut index = space.table.store.len() - levels.iter().flatten().sum::<usize>();
+    if levels[0].len() > 1 {
+        trail.forget(index);
+    }
+    for (&a, &b) in levels[0].iter().zip(&levels[1]) {
+        for (of, count) in pieces_of(a, b) {
+            trail.append(index, finds[of].trail.of(from[of], from[of] + count), &space.memory);
+            from[of] += count;
+            index += count;
+        }
+    }
+}
+
+fn append_markings(space: &mut Space, finds: [&Finds; 2], max: usize) -> Result<Option<usize>, Stop> {
     let words = space.net.words;
     let sizes: Vec<usize> = finds[0].levels.iter().zip(&finds[1].levels).map(|(a, b)| a + b).collect();
     let Some((last, before)) = sizes.split_last() else { return Ok(None) };

@@ -22,10 +22,11 @@ use crate::batch::Batch;
 use crate::budget::{Found, Stop, Watch};
 use crate::marking::Width;
 use crate::net::Net;
+use crate::sleep::{Asleep, Sleep, Trail};
 use crate::table::NONE;
 
-/// Edges after which a round ends.
-const ROUND_EDGES: u64 = 1 << 10;
+/// Edges that are looked up before a round ends.
+const ROUND_ASKED: u64 = 1 << 10;
 /// Looks for a message before one sleeps, some hundred microseconds; so many of them at once, some microseconds.
 const LOOKS: usize = 1 << 9;
 const LOOKS_AT_ONCE: usize = 1 << 7;
@@ -48,6 +49,9 @@ pub(crate) struct Work<'a> {
     pub(crate) base: usize,
     /// The fewest markings for which they go on to the next level; none where they must not.
     pub(crate) go_on: Option<usize>,
+    /// What sleeps, and by which transitions the markings found before were found.
+    pub(crate) sleep: &'a Sleep,
+    pub(crate) trail: &'a Trail,
     /// Whether a second processor is free.
     pub(crate) free: &'a AtomicBool,
     /// Whether the first of them must end while the second does not hear it.
@@ -149,6 +153,8 @@ pub(crate) struct Member {
     share: Share,
     blocks: usize,
     pub(crate) edges: u64,
+    /// How many of the edges were looked up.
+    asked: u64,
     pub(crate) fired: Vec<u64>,
     pub(crate) contacts: Vec<u64>,
     pub(crate) contact_witness: Vec<u32>,
@@ -159,8 +165,9 @@ pub(crate) struct Member {
     spare: Vec<Records>,
     room: usize,
     batch: Batch,
-    /// Of the block: which transitions fire where, and which are in contact where.
-    firing: Vec<(u32, u64)>,
+    asleep: Asleep,
+    /// Of the block: which transitions fire where, and where that is to be looked up; and which are in contact where.
+    firing: Vec<(u32, u64, u64)>,
     contact: Vec<(u32, u64)>,
 }
 
@@ -173,6 +180,7 @@ impl Member {
             share: Share::Dealt,
             blocks: 0,
             edges: 0,
+            asked: 0,
             fired: vec![0; count],
             contacts: vec![0; count],
             contact_witness: vec![NONE; count],
@@ -181,6 +189,7 @@ impl Member {
             spare: Vec::new(),
             room: 0,
             batch: Batch::new(net),
+            asleep: Asleep::nothing(),
             firing: Vec::new(),
             contact: Vec::new(),
         }
@@ -196,6 +205,7 @@ impl Member {
         watch: &mut Watch<'_>,
     ) -> Option<End> {
         (self.share, self.blocks) = (Share::Dealt, 0);
+        self.asleep = Asleep::new(work.sleep);
         if let Err(stop) = half.begin(&self.finds.memory, watch) {
             self.finds.close(stop);
         }
@@ -223,6 +233,7 @@ impl Member {
             }
             let counts = if self.finds.id == 0 { [count, others] } else { [others, count] };
             self.share = Share::Own { from, base, counts };
+            self.finds.trail.forget(from);
             from += count;
             base += count + others;
         }
@@ -252,7 +263,7 @@ impl Member {
                 return Ok(message);
             }
             // He is at something that takes long, such as a larger table.
-            if let Err(stop) = watch.tick(ROUND_EDGES as usize) {
+            if let Err(stop) = watch.tick(ROUND_ASKED as usize) {
                 self.stop(work, stop);
             }
         }
@@ -304,7 +315,7 @@ impl Member {
                 read += 1;
                 watch.found.markings = work.before.markings + self.finds.fresh.len() as u64 + other.markings;
                 watch.found.edges = work.before.edges + self.edges + other.edges;
-                if let Err(stop) = watch.tick(ROUND_EDGES as usize) {
+                if let Err(stop) = watch.tick(ROUND_ASKED as usize) {
                     self.stop(work, stop);
                 }
             }
@@ -328,10 +339,10 @@ impl Member {
         }
     }
 
-    /// Expands blocks of its share until a round's edges are followed.
+    /// Expands blocks of its share until a round's edges are looked up.
     fn round<W: Width>(&mut self, width: W, work: &Work<'_>, half: &mut impl Half<W>, watch: &mut Watch<'_>) {
-        let first = self.edges;
-        while self.finds.end.is_none() && self.edges - first < ROUND_EDGES {
+        let first = self.asked;
+        while self.finds.end.is_none() && self.asked - first < ROUND_ASKED {
             let Some(block) = self.share.block(work, self.finds.id, self.blocks) else { break };
             let before = self.edges;
             if let Err(stop) = self.expand(width, work, half, block, watch) {
@@ -361,9 +372,11 @@ impl Member {
         self.batch.markings.clear();
         self.batch.markings.extend_from_slice(&all[at * words..(at + count) * words]);
         half.cut(width, &mut self.batch);
+        let trail = if own.is_some() { &self.finds.trail } else { work.trail };
+        self.asleep.cut(trail.of(at, at + count));
         self.firing.clear();
         self.contact.clear();
-        let (mut edges, mut alive) = (0, 0);
+        let (mut edges, mut asked, mut alive) = (0, 0, 0);
         for t in 0..net.transitions.len() {
             let (base, blocked) = net.forward.test(t, &self.batch.slices, self.batch.valid);
             if base == 0 {
@@ -375,11 +388,13 @@ impl Member {
             let fire = base & !blocked & net.forward.edge(t);
             if fire != 0 {
                 alive |= fire;
+                let awake = fire & !self.asleep.of(work.sleep, t);
                 edges += fire.count_ones() as usize;
-                self.firing.push((t as u32, fire));
+                asked += awake.count_ones() as usize;
+                self.firing.push((t as u32, fire, awake));
             }
         }
-        self.make_room((edges + 1) * half.stride(width))?;
+        self.make_room((asked + 1) * half.stride(width))?;
         let mut dead = self.batch.valid & !alive;
         if dead != 0 {
             // All or none of them: what has no memory is expanded again.
@@ -396,12 +411,13 @@ impl Member {
             self.contact_witness[t] = self.contact_witness[t].min(index);
         }
         self.edges += edges as u64;
+        self.asked += asked as u64;
         self.blocks += 1;
-        for &(t, fire) in &self.firing {
+        for &(t, fire, awake) in &self.firing {
             self.fired[t as usize] += u64::from(fire.count_ones());
             let theirs = (self.theirs.all.as_mut_slice(), &mut self.theirs.len);
             let to = To { finds: &mut self.finds, theirs, watch };
-            half.push(width, net, &self.batch, t as usize, fire, to);
+            half.push(width, net, &self.batch, t as usize, awake, to);
         }
         let theirs = (self.theirs.all.as_mut_slice(), &mut self.theirs.len);
         half.end(width, net, &self.batch, false, To { finds: &mut self.finds, theirs, watch });

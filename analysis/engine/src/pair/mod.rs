@@ -44,6 +44,7 @@ use crate::budget::{Found, Stop, Watch};
 use crate::explore::Space;
 use crate::marking::Width;
 use crate::net::Net;
+use crate::sleep::{Sleep, Trail};
 use crate::table::NONE;
 pub(crate) use half::Shared;
 use half::{BLOCK, End};
@@ -101,6 +102,7 @@ impl Pair {
         width: W,
         space: &mut Space,
         set: &mut S,
+        (sleep, trail): (&Sleep, &mut Trail),
         start: usize,
         max: usize,
         watch: &mut Watch<'_>,
@@ -116,8 +118,8 @@ impl Pair {
         let go_on = S::GOES_ON.then_some(self.worth.next_level);
         loop {
             let worst;
-            (open, worst) = self.work(width, space, set, (&open, go_on), max, watch);
-            end = self.lay_down(width, space, set, max)?.unwrap_or(end);
+            (open, worst) = self.work(width, space, set, (&open, go_on, sleep, trail), max, watch);
+            end = self.lay_down(width, space, set, trail, max)?.unwrap_or(end);
             if S::GOES_ON {
                 self.wait(space.table.store.len());
             }
@@ -149,7 +151,7 @@ impl Pair {
         width: W,
         space: &mut Space,
         set: &mut impl Shared<W>,
-        (open, go_on): (&[(usize, usize)], Option<usize>),
+        (open, go_on, sleep, trail): (&[(usize, usize)], Option<usize>, &Sleep, &Trail),
         max: usize,
         watch: &mut Watch<'_>,
     ) -> (Vec<(usize, usize)>, Option<End>) {
@@ -164,7 +166,8 @@ impl Pair {
         let before = Found { markings: base as u64, edges: space.edges };
         let (free, stopped, deadline) = (&self.free, Apart(AtomicBool::new(false)), watch.deadline());
         let stopped = &stopped.0;
-        let work = Apart(Work { net: &space.net, old: store.all(), open, base, go_on, free, stopped, before });
+        let net = &space.net;
+        let work = Apart(Work { net, old: store.all(), open, base, go_on, sleep, trail, free, stopped, before });
         let [Apart(here), Apart(there)] = &mut self.members;
         let [port, its_port] = Port::both();
         let worst = thread::scope(|scope| {
@@ -197,6 +200,7 @@ impl Pair {
         width: W,
         space: &mut Space,
         set: &mut impl Shared<W>,
+        trail: &mut Trail,
         max: usize,
     ) -> Result<Option<usize>, Stop> {
         let [Apart(a), Apart(b)] = &mut self.members;
@@ -216,13 +220,14 @@ impl Pair {
             Ok(()) => [&*a, &*b].into_iter().try_for_each(|member| Pair::count(member, space)),
             Err(stop) => Err(stop),
         };
-        let result = result.and_then(|()| append(space, [&a.finds, &b.finds], max));
+        let result = result.and_then(|()| append(space, [&a.finds, &b.finds], trail, max));
         if result.is_err() {
             // The set says more than the array holds, which is still a prefix.
             set.forget_others(width, space);
         }
         for member in [a, b] {
             member.finds.fresh.clear();
+            member.finds.trail.clear();
             member.forget();
         }
         result

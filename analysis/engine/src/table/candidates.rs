@@ -13,6 +13,7 @@ use super::{NONE, Table};
 use crate::batch::Batch;
 use crate::budget::{Memory, Stop};
 use crate::marking::{Width, mix};
+use crate::sleep::Trail;
 
 /// Candidates that wait before they are looked up together. Fewer than the arrays hold, whose length is that of a
 /// byte, so that no index into them needs a check.
@@ -25,8 +26,9 @@ pub struct Candidates {
     count: usize,
     /// The mixed hash of each.
     mixed: [u64; ROOM],
-    /// Markings, end to end.
+    /// Markings, end to end, and by which transition each was found (`sleep.rs`).
     markings: Box<[u64]>,
+    lasts: [u16; ROOM],
     /// The first slot of each, as it was when the batch began.
     slots: [u32; ROOM],
     /// Those whose first slot has their tag.
@@ -42,6 +44,7 @@ impl Candidates {
             count: 0,
             mixed: [0; ROOM],
             markings: vec![0; ROOM * words].into_boxed_slice(),
+            lasts: [0; ROOM],
             slots: [0; ROOM],
             tagged: [0; ROOM],
             open: [0; ROOM],
@@ -58,7 +61,14 @@ impl Candidates {
     ///
     /// The bound is soft: the 64 that one transition adds at most find room beyond it.
     #[inline(always)]
-    pub fn push<W: Width>(&mut self, width: W, batch: &Batch, fire: u64, flip: &[u64], flip_hash: u64) -> bool {
+    pub fn push<W: Width>(
+        &mut self,
+        width: W,
+        batch: &Batch,
+        fire: u64,
+        (flip, flip_hash): (&[u64], u64),
+        last: u16,
+    ) -> bool {
         let words = width.words();
         let flip = &flip[..words];
         let mut count = self.count;
@@ -69,6 +79,7 @@ impl Candidates {
             let c = count % ROOM;
             count += 1;
             self.mixed[c] = mix(batch.hashes[j] ^ flip_hash);
+            self.lasts[c] = last;
             let from = &batch.markings[j * words..(j + 1) * words];
             let to = &mut self.markings[c * words..(c + 1) * words];
             for k in 0..words {
@@ -101,10 +112,11 @@ impl Table {
 
     /// Inserts a batch and empties it.
     #[inline(always)]
-    pub fn insert_batch<W: Width>(
+    pub(crate) fn insert_batch<W: Width>(
         &mut self,
         width: W,
         batch: &mut Candidates,
+        trail: &mut Trail,
         max: usize,
         memory: &Memory,
     ) -> Result<(), Stop> {
@@ -121,7 +133,9 @@ impl Table {
         for k in 0..open {
             let c = usize::from(batch.open[k % ROOM]);
             let marking = &batch.markings[c * words..(c + 1) * words];
-            self.insert_mixed(width, marking, batch.mixed[c], max, memory)?;
+            if self.insert_mixed(width, marking, batch.mixed[c], max, memory)? {
+                trail.append(self.store.len() - 1, &batch.lasts[c..=c], memory);
+            }
         }
         batch.count = 0;
         Ok(())
@@ -168,8 +182,8 @@ mod tests {
         batch.cut(Fixed::<2>);
         batch.hashes.fill(5);
         for round in 0..2 {
-            assert!(!candidates.push(Fixed::<2>, &batch, batch.valid, &[0, 7], 0));
-            table.insert_batch(Fixed::<2>, &mut candidates, usize::MAX, &memory).expect("fits");
+            assert!(!candidates.push(Fixed::<2>, &batch, batch.valid, (&[0, 7], 0), 0));
+            table.insert_batch(Fixed::<2>, &mut candidates, &mut Trail::default(), usize::MAX, &memory).expect("fits");
             assert_eq!(table.store.len(), 40, "after round {round}");
         }
         for i in 0..40_u64 {
