@@ -164,6 +164,11 @@ impl<S: Slot> Exact<S> {
         Ok(Exact { slots: Self::room(shape, memory)?, shape, len: 0 })
     }
 
+    /// No keys and no room for any, for which nothing is claimed.
+    pub(crate) fn none(bits: u32) -> Self {
+        Exact { slots: Region::Heap(Vec::new()), shape: Self::least(bits), len: 0 }
+    }
+
     fn room(shape: Shape, memory: &Memory) -> Result<Region<S>, Stop> {
         let bytes = Self::bytes(shape);
         memory.claim(bytes)?;

@@ -24,7 +24,7 @@ use crate::known::{Arrivals, ByKey, Hashed, Set};
 use crate::marking::{Dynamic, Width, holds};
 use crate::net::{Net, Rules};
 use crate::pair::{MEASURED, Pair, Shared};
-use crate::sleep::{Asleep, Sleep, Trail};
+use crate::sleep::Sleeping;
 use crate::step::{Components, Steps};
 use crate::table::{NONE, Table};
 use crate::with_width;
@@ -161,12 +161,20 @@ impl Space {
         } else {
             // Apart from the rest while it grows.
             let mut set = std::mem::replace(&mut self.set, Set::Hashed);
-            let pair = &mut pair;
+            let mut sleeping = Sleeping::new(&net, &self.memory);
+            let (pair, with) = (&mut pair, &mut sleeping);
             let result = match &mut set {
-                Set::Hashed => self.run_interleaving(width, &net, &mut Hashed::new(net.words), pair, max, watch),
-                Set::Narrow(keyed) => self.run_interleaving(width, &net, &mut ByKey::new(keyed), pair, max, watch),
-                Set::Wide(keyed) => self.run_interleaving(width, &net, &mut ByKey::new(keyed), pair, max, watch),
+                Set::Hashed => {
+                    self.run_interleaving(width, &net, (&mut Hashed::new(net.words), with), pair, max, watch)
+                }
+                Set::Narrow(keyed) => {
+                    self.run_interleaving(width, &net, (&mut ByKey::new(keyed), with), pair, max, watch)
+                }
+                Set::Wide(keyed) => {
+                    self.run_interleaving(width, &net, (&mut ByKey::new(keyed), with), pair, max, watch)
+                }
             };
+            sleeping.leave(&self.memory);
             self.set = set;
             if let Some(pair) = pair.take() {
                 pair.finish(self);
@@ -191,43 +199,24 @@ impl Space {
         &mut self,
         width: W,
         net: &Net,
-        arrivals: &mut impl Shared<W>,
+        (arrivals, sleeping): (&mut impl Shared<W>, &mut Sleeping),
         pair: &mut Option<Pair>,
         max: usize,
         watch: &mut Watch<'_>,
     ) -> Result<(), Stop> {
-        let sleep = Sleep::new(net, &self.memory);
-        let mut trail = Trail::default();
-        let result = self.run_levels(width, net, arrivals, (&sleep, &mut trail), pair, max, watch);
-        trail.leave(&self.memory);
-        self.memory.release(sleep.bytes());
-        result
-    }
-
-    #[inline(always)]
-    fn run_levels<W: Width>(
-        &mut self,
-        width: W,
-        net: &Net,
-        arrivals: &mut impl Shared<W>,
-        (sleep, trail): (&Sleep, &mut Trail),
-        pair: &mut Option<Pair>,
-        max: usize,
-        watch: &mut Watch<'_>,
-    ) -> Result<(), Stop> {
-        let (mut batch, mut asleep) = (Batch::new(net), Asleep::new(sleep));
+        let mut batch = Batch::new(net);
         batch.markings.extend_from_slice(&net.initial);
-        arrivals.first(width, &mut batch, (&mut self.table, trail, max, &self.memory, watch))?;
+        arrivals.first(width, &mut batch, (&mut self.table, &mut sleeping.trail, max, &self.memory, watch))?;
         let (mut next, mut end) = (0, 1);
         while self.level_end(next, &mut end)? {
-            trail.forget(next);
+            sleeping.trail.forget(next);
             let open;
             (open, end) = match pair.as_mut().filter(|pair| pair.takes(end - next, end)) {
-                Some(pair) => pair.expand(width, self, arrivals, (sleep, &mut *trail), next, max, watch)?,
+                Some(pair) => pair.expand(width, self, (&mut *arrivals, &mut *sleeping), next, max, watch)?,
                 None => (vec![(next, end)], end),
             };
             for range in open {
-                let with = (&mut batch, &mut *arrivals, sleep, &mut asleep, &mut *trail);
+                let with = (&mut batch, &mut *arrivals, &mut *sleeping);
                 self.expand(width, net, range, with, max, watch)?;
             }
             next = end;
@@ -241,7 +230,7 @@ impl Space {
         width: W,
         net: &Net,
         (first, end): (usize, usize),
-        (batch, arrivals, sleep, asleep, trail): (&mut Batch, &mut impl Arrivals<W>, &Sleep, &mut Asleep, &mut Trail),
+        (batch, arrivals, sleeping): (&mut Batch, &mut impl Arrivals<W>, &mut Sleeping),
         max: usize,
         watch: &mut Watch<'_>,
     ) -> Result<(), Stop> {
@@ -251,7 +240,7 @@ impl Space {
             batch.markings.clear();
             self.table.store.copy_range(next, stop, &mut batch.markings);
             arrivals.cut(width, batch);
-            asleep.cut(trail.of(next, stop));
+            sleeping.cut(next, stop);
             let mut alive = 0;
             let before = self.edges;
             for t in 0..net.transitions.len() {
@@ -270,11 +259,24 @@ impl Space {
                 let edges = u64::from(fire.count_ones());
                 self.fired[t] += edges;
                 self.edges += edges;
-                let awake = fire & !asleep.of(sleep, t);
-                arrivals.push(width, net, batch, t, awake, (&mut self.table, trail, max, &self.memory, watch))?;
+                let awake = sleeping.awake(t, fire);
+                arrivals.push(
+                    width,
+                    net,
+                    batch,
+                    t,
+                    awake,
+                    (&mut self.table, &mut sleeping.trail, max, &self.memory, watch),
+                )?;
             }
             self.note_deadlocks(next, batch.valid & !alive)?;
-            arrivals.end(width, net, batch, stop == end, (&mut self.table, trail, max, &self.memory, watch))?;
+            arrivals.end(
+                width,
+                net,
+                batch,
+                stop == end,
+                (&mut self.table, &mut sleeping.trail, max, &self.memory, watch),
+            )?;
             watch.found = Found { markings: self.table.store.len() as u64, edges: self.edges };
             watch.tick((stop - next) + (self.edges - before) as usize + net.transitions.len())?;
             next = stop;

@@ -12,7 +12,7 @@
 use crate::ahead::fetch;
 use crate::batch::Batch;
 use crate::budget::{Memory, Stop, Watch};
-use crate::exact::ROOM;
+use crate::exact::{Exact, ROOM};
 use crate::explore::Space;
 use crate::known::{Keyed, Set};
 use crate::marking::{Width, linear_hash};
@@ -64,6 +64,11 @@ fn slots<S>(line: &[S; LINE]) -> &[S; LANES] {
 }
 
 impl<S: Slot> Indexes<S> {
+    /// Bytes held.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(self.lines.all())
+    }
+
     /// The indexes of all markings, whose keys are in the set.
     fn new<W: Width>(
         width: W,
@@ -72,14 +77,28 @@ impl<S: Slot> Indexes<S> {
         memory: &Memory,
         watch: &mut Watch<'_>,
     ) -> Result<Self, Stop> {
-        let from = keyed.exact.all();
+        let joint = keyed.halves.as_ref().map(|halves| halves.joint(memory)).transpose()?;
+        let exact = joint.as_ref().unwrap_or(&keyed.exact);
+        let result = Self::of(width, (keyed, exact), (net, store), memory, watch);
+        memory.release(joint.as_ref().map_or(0, Exact::claimed));
+        result
+    }
+
+    fn of<W: Width>(
+        width: W,
+        (keyed, exact): (&Keyed<S>, &Exact<S>),
+        (net, store): (&Net, &Store),
+        memory: &Memory,
+        watch: &mut Watch<'_>,
+    ) -> Result<Self, Stop> {
+        let from = exact.all();
         let bytes = 2 * size_of_val(from);
         memory.claim(bytes)?;
         let Some(lines) = Region::zeroed(2 * from.len()) else {
             memory.release(bytes);
             return Err(Stop::Memory);
         };
-        let mut indexes = Indexes { lines, shape: keyed.exact.shape() };
+        let mut indexes = Indexes { lines, shape: exact.shape() };
         let fill = indexes.fill(width, keyed, from, (net, store), watch);
         fill.inspect_err(|_| memory.release(bytes)).map(|()| indexes)
     }
@@ -199,7 +218,7 @@ impl<S: Slot> Keyed<S> {
             let indexes = Indexes::new(width, self, of, memory, watch)?;
             if let Err(second) = self.indexes.set(indexes) {
                 // Somebody has done the same meanwhile.
-                memory.release(size_of_val(second.lines.all()));
+                memory.release(second.bytes());
             }
         }
         Ok(())
@@ -210,7 +229,7 @@ impl<S: Slot> Keyed<S> {
         if let Some(indexes) = self.indexes.get() {
             return indexes.find_one(key);
         }
-        let known = self.exact.has(key);
+        let known = self.has(key);
         (0..store.len()).find(|&index| known && store.get(width, index) == marking).map(|index| index as u32)
     }
 
@@ -275,8 +294,8 @@ impl Space {
     pub fn may_hold<W: Width>(&self, width: W, marking: &[u64]) -> bool {
         match &self.set {
             Set::Hashed => self.table.find(width, marking, linear_hash(width, marking)).is_some(),
-            Set::Narrow(keyed) => keyed.exact.has(keyed.span.key(marking)),
-            Set::Wide(keyed) => keyed.exact.has(keyed.span.key(marking)),
+            Set::Narrow(keyed) => keyed.has(keyed.span.key(marking)),
+            Set::Wide(keyed) => keyed.has(keyed.span.key(marking)),
         }
     }
 

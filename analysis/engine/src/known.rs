@@ -20,7 +20,7 @@ use crate::exact::{Asked, Exact, ROOM};
 use crate::indexes::Indexes;
 use crate::marking::{Width, linear_hash};
 use crate::net::Net;
-use crate::pair::Sides;
+use crate::pair::{Halves, Sides};
 use crate::seat::Slot;
 use crate::sleep::{Trail, last};
 use crate::span::Span;
@@ -48,7 +48,10 @@ pub struct Keyed<S> {
     /// The keys.
     pub span: Span,
     spread: Spread,
+    /// All keys, while the exploration goes on.
     pub(crate) exact: Exact<S>,
+    /// All keys where two threads have found the last of them: nobody asks for them in one table before `indexes.rs` does.
+    pub(crate) halves: Option<Halves<S>>,
     pub(crate) indexes: OnceLock<Indexes<S>>,
 }
 
@@ -79,7 +82,12 @@ impl<S: Slot> Keyed<S> {
         let spread = Spread::new(net, &span);
         memory.claim(spread.bytes())?;
         let exact = Exact::new(span.bits, memory)?;
-        Ok(Keyed { span, spread, exact, indexes: OnceLock::new() })
+        Ok(Keyed { span, spread, exact, halves: None, indexes: OnceLock::new() })
+    }
+
+    /// Whether a key is in the set.
+    pub(crate) fn has(&self, key: u64) -> bool {
+        self.halves.as_ref().map_or_else(|| self.exact.has(key), |halves| halves.has(key))
     }
 
     /// The keys, the way back from them, and the set itself.

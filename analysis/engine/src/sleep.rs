@@ -191,10 +191,40 @@ impl Trail {
         self.lasts.clear();
         self.first = 0;
     }
+}
+
+/// All of that for a search over markings with indexes.
+#[derive(Debug)]
+pub(crate) struct Sleeping {
+    pub(crate) sleep: Sleep,
+    pub(crate) trail: Trail,
+    /// Of the batch that is expanded.
+    asleep: Asleep,
+}
+
+impl Sleeping {
+    /// Nothing is known of any marking of a net.
+    pub(crate) fn new(net: &Net, memory: &Memory) -> Self {
+        let sleep = Sleep::new(net, memory);
+        Sleeping { asleep: Asleep::new(&sleep), sleep, trail: Trail::default() }
+    }
+
+    /// Takes the markings of a range, at most 64.
+    #[inline(always)]
+    pub(crate) fn cut(&mut self, first: usize, end: usize) {
+        self.asleep.cut(self.trail.of(first, end));
+    }
+
+    /// Those firings of a transition, at the markings taken, that are to be looked up.
+    #[inline(always)]
+    pub(crate) fn awake(&mut self, t: usize, fire: u64) -> u64 {
+        fire & !self.asleep.of(&self.sleep, t)
+    }
 
     /// Gives the memory back.
     pub(crate) fn leave(self, memory: &Memory) {
-        memory.drop_vec(self.lasts);
+        memory.drop_vec(self.trail.lasts);
+        memory.release(self.sleep.bytes());
     }
 }
 
@@ -350,7 +380,7 @@ mod tests {
         trail.clear();
         trail.append(1, &[2], &memory);
         assert_eq!(trail.of(0, 2), [0, 2]);
-        trail.leave(&memory);
+        memory.drop_vec(trail.lasts);
         assert_eq!(memory.used(), 0);
     }
 }

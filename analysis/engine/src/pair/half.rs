@@ -9,7 +9,7 @@ use crate::explore::Space;
 use crate::known::Arrivals;
 use crate::marking::Width;
 use crate::net::Net;
-use crate::sleep::Trail;
+use crate::sleep::{Sleeping, Trail};
 use crate::store::Store;
 use crate::table::Table;
 
@@ -90,6 +90,11 @@ impl Finds {
         });
     }
 
+    /// Whether it has found nothing in the last level, and all of that.
+    pub(crate) fn is_over(&self) -> bool {
+        self.levels.last() == Some(&0) && self.end.is_none() && self.left.is_empty()
+    }
+
     /// Keeps what finds no place in the half.
     #[cold]
     pub(crate) fn leave(&mut self, record: &[u64]) {
@@ -147,9 +152,9 @@ pub(crate) trait Shared<W: Width>: Arrivals<W> {
     /// Whether the threads may go on to the next level with what they found: where the set says no indexes.
     const GOES_ON: bool;
 
-    /// Says how the set is cut for a level that ends at an index; false where more than that part of two threads' time would be
-    /// lost.
-    fn cut(&mut self, width: W, space: &Space, end: usize, loss_most: f64) -> bool;
+    /// Says how the set is cut for the level that was found last, by what sleeps there; false where more than that part of two
+    /// threads' time would be lost.
+    fn cut(&mut self, width: W, space: &Space, sleeping: &Sleeping, loss_most: f64) -> bool;
 
     /// The array of markings, and the two halves.
     fn halves<'a>(&'a mut self, table: &'a mut Table) -> (&'a Store, [Self::Half<'a>; 2]);

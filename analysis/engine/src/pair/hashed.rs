@@ -17,7 +17,7 @@ use crate::known::Hashed;
 use crate::marking::{Width, linear_hash, mix};
 use crate::net::Net;
 use crate::region::write_first;
-use crate::sleep::last;
+use crate::sleep::{Sleeping, last};
 use crate::store::Store;
 use crate::table::{Shape, Table};
 
@@ -262,7 +262,7 @@ impl<W: Width> Shared<W> for Hashed {
     type Half<'a> = HashedHalf<'a>;
     const GOES_ON: bool = false;
 
-    fn cut(&mut self, _: W, _: &Space, _: usize, _: f64) -> bool {
+    fn cut(&mut self, _: W, _: &Space, _: &Sleeping, _: f64) -> bool {
         true
     }
 

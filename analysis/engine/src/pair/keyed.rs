@@ -2,7 +2,7 @@
 //!
 //! Most firings stay on their side, so most of what a thread does is what one alone would do, in a table half as
 //! large. Of a firing that crosses a record is the key. A marking is made of that where it is new; of one's own, of the
-//! marking that is fired from, which takes less. When the threads end, both tables are put together.
+//! marking that is fired from, which takes less. Where something is left for one thread to do, both tables are put together.
 //!
 //! The set says no indexes, so nothing is numbered before the markings stand in the array, and the threads may go on from
 //! level to level meanwhile.
@@ -25,7 +25,7 @@ use crate::known::ByKey;
 use crate::marking::Width;
 use crate::net::Net;
 use crate::seat::Slot;
-use crate::sleep::last;
+use crate::sleep::{Sleeping, last};
 use crate::span::Span;
 use crate::spread::Spread;
 use crate::store::Store;
@@ -39,6 +39,30 @@ const ALSO_FULL: f64 = 0.5;
 pub(crate) struct Sides<S> {
     parting: Parting,
     tables: [Apart<Option<Exact<S>>>; 2],
+}
+
+/// The set as both threads have left it, with nothing more to find.
+#[derive(Debug)]
+pub(crate) struct Halves<S> {
+    parting: Parting,
+    tables: [Exact<S>; 2],
+}
+
+impl<S: Slot> Halves<S> {
+    /// Whether a key is in the set.
+    pub(crate) fn has(&self, key: u64) -> bool {
+        self.tables[self.parting.of_key(key)].has(key)
+    }
+
+    /// Bytes claimed.
+    pub(crate) fn claimed(&self) -> usize {
+        self.tables.iter().map(Exact::claimed).sum()
+    }
+
+    /// All keys in one table.
+    pub(crate) fn joint(&self, memory: &Memory) -> Result<Exact<S>, Stop> {
+        Exact::joint([&self.tables[0], &self.tables[1]], memory)
+    }
 }
 
 /// One side, in the hands of its thread.
@@ -202,11 +226,10 @@ impl<W: Width, S: Slot> Shared<W> for ByKey<'_, S> {
         Self: 'a;
     const GOES_ON: bool = true;
 
-    fn cut(&mut self, width: W, space: &Space, end: usize, loss_most: f64) -> bool {
+    fn cut(&mut self, width: W, space: &Space, sleeping: &Sleeping, loss_most: f64) -> bool {
         let (span, spread, _) = self.keyed.parts();
-        // The last two levels.
-        let first = space.levels[space.levels.len().saturating_sub(2)] as usize;
-        let parting = Parting::choose(width, space, (span, spread), (first, end), loss_most);
+        let from = [2, 1].map(|levels| space.levels[space.levels.len().saturating_sub(levels)] as usize);
+        let parting = Parting::choose(width, space, (span, spread), from, sleeping, loss_most);
         self.sides = parting.map(|parting| Sides { parting, tables: [Apart(None), Apart(None)] });
         self.sides.is_some()
     }
@@ -231,21 +254,28 @@ impl<W: Width, S: Slot> Shared<W> for ByKey<'_, S> {
 
     /// Time is not asked for here: without the joint table all that was found would be lost.
     fn complete(&mut self, _: W, space: &mut Space, finds: [&Finds; 2]) -> Result<(), Stop> {
-        let tables = self.sides.take().map_or([None, None], |sides| sides.tables.map(|Apart(table)| table));
-        let whole = self.keyed.parts().2;
-        let result = match &tables {
-            // What was found before is in the one table, and nothing else was found.
-            _ if finds.iter().all(|of| of.fresh.is_empty()) => Ok(()),
-            [Some(low), Some(high)] => Exact::joint([low, high], &space.memory).map(|joint| {
-                space.memory.release(whole.claimed());
-                *whole = joint;
-            }),
-            _ => unreachable!("who has found something has begun"),
-        };
-        for (of, table) in finds.iter().zip(&tables) {
+        let Some(Sides { parting, tables: [Apart(low), Apart(high)] }) = self.sides.take() else { return Ok(()) };
+        for (of, table) in finds.iter().zip([&low, &high]) {
             of.memory.release(table.as_ref().map_or(0, Exact::claimed));
         }
-        result
+        // What was found before is in the one table, and nothing else was found.
+        if finds.iter().all(|of| of.fresh.is_empty()) {
+            return Ok(());
+        }
+        let [Some(low), Some(high)] = [low, high] else { unreachable!("who has found something has begun") };
+        let (whole, memory) = (&mut self.keyed.exact, &space.memory);
+        if finds.iter().all(|of| of.is_over()) {
+            let halves = Halves { parting, tables: [low, high] };
+            memory.claim(halves.claimed())?;
+            memory.release(whole.claimed());
+            *whole = Exact::none(self.keyed.span.bits);
+            self.keyed.halves = Some(halves);
+            return Ok(());
+        }
+        let joint = Exact::joint([&low, &high], memory)?;
+        memory.release(whole.claimed());
+        *whole = joint;
+        Ok(())
     }
 
     fn grow(&mut self, _: W, _: &mut Space, _: &mut Watch<'_>) -> Result<bool, Stop> {

@@ -22,11 +22,13 @@ use crate::batch::Batch;
 use crate::budget::{Found, Stop, Watch};
 use crate::marking::Width;
 use crate::net::Net;
-use crate::sleep::{Asleep, Sleep, Trail};
+use crate::sleep::{Asleep, Sleeping};
 use crate::table::NONE;
 
 /// Edges that are looked up before a round ends.
-const ROUND_ASKED: u64 = 1 << 10;
+const ROUND_ASKED: u64 = 1 << 12;
+/// Small levels that both go through all the same: they may be the last, and then the set need not be put together.
+const SMALL_MOST: usize = 64;
 /// Looks for a message before one sleeps, some hundred microseconds; so many of them at once, some microseconds.
 const LOOKS: usize = 1 << 9;
 const LOOKS_AT_ONCE: usize = 1 << 7;
@@ -50,8 +52,7 @@ pub(crate) struct Work<'a> {
     /// The fewest markings for which they go on to the next level; none where they must not.
     pub(crate) go_on: Option<usize>,
     /// What sleeps, and by which transitions the markings found before were found.
-    pub(crate) sleep: &'a Sleep,
-    pub(crate) trail: &'a Trail,
+    pub(crate) sleeping: &'a Sleeping,
     /// Whether a second processor is free.
     pub(crate) free: &'a AtomicBool,
     /// Whether the first of them must end while the second does not hear it.
@@ -205,7 +206,7 @@ impl Member {
         watch: &mut Watch<'_>,
     ) -> Option<End> {
         (self.share, self.blocks) = (Share::Dealt, 0);
-        self.asleep = Asleep::new(work.sleep);
+        self.asleep = Asleep::new(&work.sleeping.sleep);
         if let Err(stop) = half.begin(&self.finds.memory, watch) {
             self.finds.close(stop);
         }
@@ -215,7 +216,7 @@ impl Member {
             return begun;
         }
         let (mut from, mut base) = (0, work.base);
-        let (mut spent, mut found) = (0, 0);
+        let (mut spent, mut found, mut small) = (0, 0, 0);
         loop {
             self.blocks = 0;
             let ended = self.level(width, work, half, port, watch).ok()?;
@@ -228,7 +229,9 @@ impl Member {
             spent += 2 * count.max(others);
             found += count + others;
             let is_uneven = found > work.base && 4 * spent > 5 * found;
-            if ended.is_some() || !go_on || is_uneven || work.go_on.is_none_or(|least| count + others < least) {
+            small += usize::from(work.go_on.is_none_or(|least| count + others < least));
+            let is_worth_it = go_on && !is_uneven && work.go_on.is_some() && small <= SMALL_MOST;
+            if ended.is_some() || count + others == 0 || !is_worth_it {
                 return ended;
             }
             let counts = if self.finds.id == 0 { [count, others] } else { [others, count] };
@@ -372,7 +375,7 @@ impl Member {
         self.batch.markings.clear();
         self.batch.markings.extend_from_slice(&all[at * words..(at + count) * words]);
         half.cut(width, &mut self.batch);
-        let trail = if own.is_some() { &self.finds.trail } else { work.trail };
+        let trail = if own.is_some() { &self.finds.trail } else { &work.sleeping.trail };
         self.asleep.cut(trail.of(at, at + count));
         self.firing.clear();
         self.contact.clear();
@@ -388,7 +391,7 @@ impl Member {
             let fire = base & !blocked & net.forward.edge(t);
             if fire != 0 {
                 alive |= fire;
-                let awake = fire & !self.asleep.of(work.sleep, t);
+                let awake = fire & !self.asleep.of(&work.sleeping.sleep, t);
                 edges += fire.count_ones() as usize;
                 asked += awake.count_ones() as usize;
                 self.firing.push((t as u32, fire, awake));

@@ -8,8 +8,9 @@
 //!
 //! Where markings have exact keys (`keyed.rs`) they are cut by a parity that few firings change (`parting.rs`). Each thread
 //! then has a table of its own, as if it were alone, and goes on with what it has found itself from level to level, until
-//! levels get small or uneven; then both tables are put together. So what it costs to start a thread and to cut a set is
-//! not the price of a level. A set of hashes (`hashed.rs`) says indexes, and is cut by the highest bit of the hash, for one
+//! levels get small or uneven; then both tables are put together, unless everything is found: the set stays in halves then
+//! until somebody asks for indexes, which most questions do not. So what it costs to start a thread and to cut a set is not
+//! the price of a level. A set of hashes (`hashed.rs`) says indexes, and is cut by the highest bit of the hash, for one
 //! level.
 //!
 //! Indexes stay one numbering by levels: in each level 64 of one thread, 64 of the other, in turn, then what one has found
@@ -23,8 +24,8 @@
 //! day to day; to sort each level afterwards costs more than the buffers.
 //!
 //! What is left between this and twice as quick: the levels before the first large one; each thread waits up to a tenth of
-//! its time for the other, most of it at the ends of levels, so nets of many small levels gain least; keys move once more
-//! when tables are put together. Two explorations that share nothing, at once, are 1.8 to 1.95 times as quick as one after
+//! its time for the other, most of it at the ends of levels, so nets of many small levels gain least; markings are copied
+//! once more. Two explorations that share nothing, at once, are 1.8 to 1.95 times as quick as one after
 //! the other.
 
 mod half;
@@ -44,11 +45,11 @@ use crate::budget::{Found, Stop, Watch};
 use crate::explore::Space;
 use crate::marking::Width;
 use crate::net::Net;
-use crate::sleep::{Sleep, Trail};
+use crate::sleep::Sleeping;
 use crate::table::NONE;
 pub(crate) use half::Shared;
 use half::{BLOCK, End};
-pub(crate) use keyed::Sides;
+pub(crate) use keyed::{Halves, Sides};
 use laying::append;
 use member::{Member, Port, Work};
 
@@ -101,8 +102,7 @@ impl Pair {
         &mut self,
         width: W,
         space: &mut Space,
-        set: &mut S,
-        (sleep, trail): (&Sleep, &mut Trail),
+        (set, sleeping): (&mut S, &mut Sleeping),
         start: usize,
         max: usize,
         watch: &mut Watch<'_>,
@@ -111,15 +111,15 @@ impl Pair {
         if S::GOES_ON {
             self.wait(end);
         }
-        if !set.cut(width, space, end, self.worth.loss) {
+        if !set.cut(width, space, sleeping, self.worth.loss) {
             return Ok((vec![(start, end)], end));
         }
         let mut open: Vec<_> = (start..end).step_by(BLOCK).map(|first| (first, end.min(first + BLOCK))).collect();
         let go_on = S::GOES_ON.then_some(self.worth.next_level);
         loop {
             let worst;
-            (open, worst) = self.work(width, space, set, (&open, go_on, sleep, trail), max, watch);
-            end = self.lay_down(width, space, set, trail, max)?.unwrap_or(end);
+            (open, worst) = self.work(width, space, set, (&open, go_on, sleeping), max, watch);
+            end = self.lay_down(width, space, (set, sleeping), max)?.unwrap_or(end);
             if S::GOES_ON {
                 self.wait(space.table.store.len());
             }
@@ -151,7 +151,7 @@ impl Pair {
         width: W,
         space: &mut Space,
         set: &mut impl Shared<W>,
-        (open, go_on, sleep, trail): (&[(usize, usize)], Option<usize>, &Sleep, &Trail),
+        (open, go_on, sleeping): (&[(usize, usize)], Option<usize>, &Sleeping),
         max: usize,
         watch: &mut Watch<'_>,
     ) -> (Vec<(usize, usize)>, Option<End>) {
@@ -167,7 +167,7 @@ impl Pair {
         let (free, stopped, deadline) = (&self.free, Apart(AtomicBool::new(false)), watch.deadline());
         let stopped = &stopped.0;
         let net = &space.net;
-        let work = Apart(Work { net, old: store.all(), open, base, go_on, sleep, trail, free, stopped, before });
+        let work = Apart(Work { net, old: store.all(), open, base, go_on, sleeping, free, stopped, before });
         let [Apart(here), Apart(there)] = &mut self.members;
         let [port, its_port] = Port::both();
         let worst = thread::scope(|scope| {
@@ -199,8 +199,7 @@ impl Pair {
         &mut self,
         width: W,
         space: &mut Space,
-        set: &mut impl Shared<W>,
-        trail: &mut Trail,
+        (set, sleeping): (&mut impl Shared<W>, &mut Sleeping),
         max: usize,
     ) -> Result<Option<usize>, Stop> {
         let [Apart(a), Apart(b)] = &mut self.members;
@@ -220,7 +219,7 @@ impl Pair {
             Ok(()) => [&*a, &*b].into_iter().try_for_each(|member| Pair::count(member, space)),
             Err(stop) => Err(stop),
         };
-        let result = result.and_then(|()| append(space, [&a.finds, &b.finds], trail, max));
+        let result = result.and_then(|()| append(space, [&a.finds, &b.finds], &mut sleeping.trail, max));
         if result.is_err() {
             // The set says more than the array holds, which is still a prefix.
             set.forget_others(width, space);
@@ -258,7 +257,9 @@ mod tests {
     use crate::batch::Batch;
     use crate::budget::unwatched;
     use crate::explore::Limits;
+    use crate::known::Set;
     use crate::marking::Dynamic;
+    use crate::net::Transition;
     use crate::paths::path_to;
     use crate::samples::{machines, random_nets};
 
@@ -347,6 +348,46 @@ mod tests {
     }
 
     #[test]
+    fn two_threads_find_what_one_finds_where_markings_are_hashed() {
+        for machines_beside in [0, 5] {
+            // A chain too long for its markings to have keys.
+            let mut transitions = machines(machines_beside, 0).transitions;
+            let first = 2 * machines_beside;
+            transitions.extend((first..first + 64).map(|p| Transition::new(&[p], &[p + 1], &[], &[], &[])));
+            let marked: Vec<u32> = (0..=machines_beside).map(|i| 2 * i).collect();
+            let net = Net::new(first as usize + 65, transitions, &marked).expect("well formed");
+            let (one, two) = (alone(&net, ALL), by_two(&net, ALL));
+            assert!(matches!(two.set, Set::Hashed) && two.len() == 65 << machines_beside);
+            agree(&one, &two);
+        }
+    }
+
+    #[test]
+    fn what_both_have_found_is_found_again_in_halves_and_with_indexes() {
+        let mut in_halves = 0;
+        for net in random_nets(100).chain([machines(12, 0), machines(10, 100)]) {
+            let space = by_two(&net, ALL);
+            let known = |space: &Space| {
+                for index in 0..space.len() {
+                    assert_eq!(space.find(space.marking(index)), Some(index as u32));
+                    assert!(space.may_hold(Dynamic(net.words), space.marking(index)));
+                }
+                let stranger = vec![!0; net.words];
+                assert_eq!(space.find(&stranger), None);
+            };
+            known(&space);
+            in_halves += usize::from(matches!(&space.set, Set::Narrow(keyed) if keyed.halves.is_some()));
+            let (held, mut poll) = (space.memory.used(), unwatched);
+            space.index(&mut Watch::new(None, &mut poll)).expect("fits");
+            known(&space);
+            let Set::Narrow(keyed) = &space.set else { continue };
+            // What was put together for that is given back.
+            assert_eq!(space.memory.used() - held, keyed.indexes.get().expect("just made").bytes());
+        }
+        assert!(in_halves > 50, "{in_halves}");
+    }
+
+    #[test]
     fn the_numbering_is_a_function_of_the_net() {
         let net = machines(14, 0);
         for worth in [ALWAYS, MEASURED] {
@@ -415,6 +456,10 @@ mod tests {
     fn what_members_held_is_released() {
         let net = machines(13, 0);
         let (one, two) = (alone(&net, ALL), by_two(&net, ALL));
-        assert_eq!(one.memory.used(), two.memory.used());
+        let table = |space: &Space| {
+            let Set::Narrow(keyed) = &space.set else { panic!("few bits") };
+            keyed.halves.as_ref().map_or(keyed.exact.claimed(), |halves| halves.claimed())
+        };
+        assert_eq!(one.memory.used() - table(&one), two.memory.used() - table(&two));
     }
 }

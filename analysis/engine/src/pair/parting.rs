@@ -5,8 +5,8 @@
 //! do with each other is even in about half of the markings, even where each of them is marked in a fourth.
 //!
 //! The places are chosen by what was found so far: one after the other whichever lowers what a firing is expected to
-//! cost most, by the markings of the last two levels and by how often each transition has fired. If levels turn out
-//! to be shared out badly later, they are chosen anew.
+//! cost most, by the markings of the last two levels and by how often each transition is looked up in the last one. If levels
+//! turn out to be shared out badly later, they are chosen anew.
 //!
 //! A parity is linear and so is the key of a marking (`span.rs`), so the side of a key is the parity of some of its bits.
 
@@ -14,6 +14,7 @@ use crate::batch::Batch;
 use crate::explore::Space;
 use crate::marking::{Width, holds};
 use crate::net::Net;
+use crate::sleep::{Asleep, Sleeping};
 use crate::span::Span;
 use crate::spread::Spread;
 
@@ -41,32 +42,31 @@ pub(crate) struct Parting {
 }
 
 impl Parting {
-    /// The best for what was found of a net, unless it loses more of the time of two threads than that; the markings from
-    /// `first` to `end` are looked at.
+    /// The best for what was found of a net, unless it loses more of the time of two threads than that. The markings from the
+    /// first of `from` on are looked at; those from the second on are to be expanded.
     pub(crate) fn choose<W: Width>(
         width: W,
         space: &Space,
         (span, spread): (&Span, &Spread),
-        (first, end): (usize, usize),
+        from: [usize; 2],
+        sleeping: &Sleeping,
         loss_most: f64,
     ) -> Option<Self> {
         let net = &space.net;
         let flips: Vec<Vec<u32>> = (0..net.transitions.len()).map(|t| flipped(net, t, width.words())).collect();
         let mut touching = vec![Vec::new(); 64 * width.words()];
-        for (t, flipped) in flips.iter().enumerate().filter(|&(t, _)| space.fired[t] > 0) {
+        let sample = Sample::take(width, space, from, sleeping);
+        for (t, flipped) in flips.iter().enumerate().filter(|&(t, _)| sample.asked[t] > 0) {
             flipped.iter().for_each(|&p| touching[p as usize].push(t));
         }
-        let sample = Sample::take(width, space, (first, end));
-        let all = space.fired.iter().sum::<u64>().max(1) as f64;
+        let all = sample.asked.iter().sum::<i64>().max(1) as f64;
         let (mut places, mut parity) = (Vec::new(), vec![0; sample.blocks]);
         let (mut crosses, mut crossing, mut loss) = (vec![false; flips.len()], 0_i64, 1.0);
         while places.len() < PLACES_MOST {
             let may = |&p: &usize| !touching[p].is_empty() && !places.contains(&(p as u32));
             let candidates = (0..touching.len()).filter(may).map(|p| {
-                let more: i64 = touching[p]
-                    .iter()
-                    .map(|&t| if crosses[t] { -(space.fired[t] as i64) } else { space.fired[t] as i64 })
-                    .sum();
+                let more: i64 =
+                    touching[p].iter().map(|&t| if crosses[t] { -sample.asked[t] } else { sample.asked[t] }).sum();
                 let imbalance = sample.imbalance(&parity, p).max(LATER.powi(places.len() as i32 + 1));
                 let loss = imbalance + HANDING_OVER * (crossing + more) as f64 / all;
                 (loss, p, more)
@@ -120,16 +120,20 @@ fn flipped(net: &Net, t: usize, words: usize) -> Vec<u32> {
     flipped
 }
 
-/// Some markings, a word of 64 of them for each place and block.
+/// Some markings of the last two levels, a word of 64 of them for each place and block; and how often each transition is looked
+/// up in those of the last.
 struct Sample {
     blocks: usize,
+    asked: Vec<i64>,
     slices: Vec<u64>,
     valid: Vec<u64>,
 }
 
 impl Sample {
-    fn take<W: Width>(width: W, space: &Space, (first, end): (usize, usize)) -> Self {
-        let mut batch = Batch::new(&space.net);
+    fn take<W: Width>(width: W, space: &Space, [first, level]: [usize; 2], sleeping: &Sleeping) -> Self {
+        let end = space.len();
+        let (mut batch, mut asleep) = (Batch::new(&space.net), Asleep::new(&sleeping.sleep));
+        let mut asked = vec![0; space.net.transitions.len()];
         let (mut slices, mut valid) = (Vec::new(), Vec::new());
         let blocks = SAMPLE.min(SAMPLE_BYTES / (8 * 64 * width.words())).max(1);
         let step = (end - first).div_ceil(64).div_ceil(blocks).max(1);
@@ -139,10 +143,17 @@ impl Sample {
             batch.slice(width);
             slices.push(batch.slices.clone());
             valid.push(batch.valid);
+            if first >= level {
+                asleep.cut(sleeping.trail.of(first, end.min(first + 64)));
+                for (t, asked) in asked.iter_mut().enumerate() {
+                    let fire = space.net.forward.fire(t, &batch.slices, batch.valid);
+                    *asked += i64::from((fire & !asleep.of(&sleeping.sleep, t)).count_ones());
+                }
+            }
         }
         // Place by place.
         let by_place = (0..64 * width.words()).flat_map(|p| slices.iter().map(move |of| of[p])).collect();
-        Sample { blocks: valid.len(), slices: by_place, valid }
+        Sample { blocks: valid.len(), asked, slices: by_place, valid }
     }
 
     /// By how much, of 1, the sides differ in size if the tokens of a place are counted as well.
@@ -170,7 +181,10 @@ mod tests {
         let span = Span::new(&space.net).expect("few places");
         let spread = Spread::new(&space.net, &span);
         let width = Dynamic(space.net.words);
-        let parting = Parting::choose(width, space, (&span, &spread), (0, space.len()), loss_most)?;
+        let sleeping = Sleeping::new(&space.net, &space.memory);
+        let parting = Parting::choose(width, space, (&span, &spread), [0, 0], &sleeping, loss_most);
+        sleeping.leave(&space.memory);
+        let parting = parting?;
         Some((span, parting))
     }
 
