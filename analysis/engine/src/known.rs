@@ -290,6 +290,8 @@ mod tests {
             let limits = Limits { step: false, markings: 20_000, memory_bytes: 1 << 30, time: None };
             let space = Space::explore(chained(length), limits, &mut unwatched).expect("fits");
             assert_eq!((kind(&space.set), space.len()), (expected, 20_000));
+            let mut poll = unwatched;
+            space.index(&mut Watch::new(None, &mut poll)).expect("fits");
             // As the plain way finds them.
             let mut plain: Vec<Vec<u64>> = vec![space.net.initial.clone()];
             let mut levels = std::collections::HashMap::from([(plain[0].clone(), 0)]);
