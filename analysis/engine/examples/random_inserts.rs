@@ -1,7 +1,7 @@
 //! The physical limit, for benchmarks: keys looked up and inserted at random in a table of a given size, and nothing else.
 //!
-//! Arguments: words of a key, number of distinct keys, number of operations. Whoever explores asks once for each edge
-//! whether its marking is known, so an edge costs one such operation at least. Operations come in batches of 64, whose
+//! Arguments: words of a key, number of distinct keys, number of operations. Who asks for each edge whether its
+//! marking is known pays one such operation for it at least; the engine does not ask for each (`sleep.rs`). Operations come in batches of 64, whose
 //! first probes do not wait for each other; keys of one or two words stand in the table itself, longer ones in an array
 //! that the table points into. Nothing is computed but the key, from a counter, and its hash. The table is a power of two
 //! and at most three quarters full. Prints the keys found and the seconds.

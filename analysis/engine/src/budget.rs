@@ -151,7 +151,7 @@ const POLL_EVERY: Duration = Duration::from_millis(40);
 pub struct Found {
     /// Markings.
     pub markings: u64,
-    /// Edges followed.
+    /// Edges counted.
     pub edges: u64,
 }
 

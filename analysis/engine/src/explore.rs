@@ -6,7 +6,8 @@
 //! tested for all of them by one word operation for each place it touches, and contact and deadlock are read off the
 //! same words. Batches end at the end of a level: a batch across levels would number a successor of the later
 //! level before one of the earlier, and paths would no longer be shortest. Every firing is counted, but only those are looked up
-//! that may lead to a new marking: where independent firings meet again, one order of them is enough (`sleep.rs`).
+//! that may lead to a new marking: where independent firings meet again, one order of them is enough (`sleep.rs`). So where a
+//! budget ends within a level, a successor of a marking that was expanded may be missing.
 //!
 //! Rejected: enabledness kept incrementally from the parent marking (it lost to bit slices everywhere it was measured);
 //! storing edges (they are recomputed faster than they are read back, and cost more than the markings); storing

@@ -3,7 +3,7 @@
 //! Exploring needs no index, so the table of keys (`exact.rs`) has none. Whoever asks first has the table copied, each
 //! bucket followed by the indexes of its eight keys. Key and index then stand in one line of the cache, and a look-up
 //! is one miss, as while exploring. It costs 8 bytes a slot (16 where slots have 64 bits), held for as long as the
-//! graph.
+//! graph. A set that two threads have left in halves is put together for that, and stays in halves beside it.
 //!
 //! Rejected: indexes in an array of their own beside the table (half the memory, but a second miss: storing all edges
 //! then takes a third longer); to build them while exploring (each growth would move them, and most questions never

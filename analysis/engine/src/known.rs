@@ -10,7 +10,7 @@
 //! Rejected: to look up each candidate in the pass that makes it (a tenth fewer instructions,
 //! but so many stand between two reads of the table that few cache misses overlap: two fifths of the time was waiting).
 //! Not tried: a small table of the latest hits before the large one; sorting many candidates by their place in the
-//! table. Both would cost each edge more instructions than are left in a look-up.
+//! table. Both would cost each look-up more instructions than are left in it.
 
 use std::sync::OnceLock;
 
@@ -175,12 +175,14 @@ pub struct ByKey<'a, S> {
     made: [u32; ROOM],
     /// While two threads explore, how the set is cut, and the table of each.
     pub(crate) sides: Option<Sides<S>>,
+    /// What they have left, with nothing more to find, until the array holds it too.
+    pub(crate) left: Option<Halves<S>>,
 }
 
 impl<'a, S: Slot> ByKey<'a, S> {
     /// None yet.
     pub fn new(keyed: &'a mut Keyed<S>) -> Self {
-        ByKey { keyed, asked: Asked::new(), made: [0; ROOM], sides: None }
+        ByKey { keyed, asked: Asked::new(), made: [0; ROOM], sides: None, left: None }
     }
 
     /// Looks up what came, and appends what is new.

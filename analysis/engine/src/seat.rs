@@ -47,7 +47,7 @@ pub trait Slot: Pod + Eq + Send + Sync {
     fn get(self) -> u64;
     /// A bit for each slot of a bucket that has a value.
     fn matches(bucket: &[Self; LANES], value: Self) -> u32;
-    /// Whether some slot of a bucket has a value. What a look-up asks once for each edge, so both halves of the bucket are
+    /// Whether some slot of a bucket has a value. What each look-up asks first, so both halves of the bucket are
     /// joined before anything is made of them.
     fn holds(bucket: &[Self; LANES], value: Self) -> bool;
 }

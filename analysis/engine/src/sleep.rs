@@ -2,12 +2,12 @@
 //!
 //! Two transitions are *independent* where neither changes a place that the other tests (tokens, contact, gates). Let a
 //! breadth-first search have found x from p by s, and let t be independent of s, enabled at x and later in the list of
-//! transitions. Then t is enabled at p too, and p t y s leads where x t does, from a marking y of the level of x. So t
+//! transitions. Then t is enabled at p too, and p t y s leads where x t does, from a marking y that is no further than x. So t
 //! *sleeps* at x: that firing is counted, but nobody asks the table where it leads.
 //!
 //! No marking is missed, and none is found later. Let m be of the next level; of all firings from this level that lead to m
 //! take one of the lowest transition, from x by t. Were it asleep, then x was found by some s before t, and s leads to m from
-//! a marking of this level: a lower one. So one firing at least that leads to m is looked up. It does not matter which of the
+//! such a y, which is of this level, or m would not be of the next: a lower one. So one firing at least that leads to m is looked up. It does not matter which of the
 //! ways to x came first, so two threads may find markings in any order, and of a marking of which no way is known
 //! nothing sleeps.
 //!
@@ -152,8 +152,9 @@ pub(crate) struct Trail {
 }
 
 impl Trail {
-    /// Forgets the markings before an index.
+    /// Forgets the markings before an index, which never goes back.
     pub(crate) fn forget(&mut self, before: usize) {
+        debug_assert!(before >= self.first);
         let gone = before.saturating_sub(self.first).min(self.lasts.len());
         self.lasts.drain(..gone);
         self.first = before;

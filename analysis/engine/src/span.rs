@@ -151,6 +151,20 @@ mod tests {
     }
 
     #[test]
+    fn a_key_and_a_transition_share_a_word_where_both_have_room() {
+        let chain = |length| (0..length).map(|p| Transition::new(&[p], &[p + 1], &[], &[], &[])).collect();
+        for (length, most) in [(60, 15), (50, 0x3fff), (20, u16::MAX)] {
+            let span = Span::new(&Net::new(61, chain(length), &[0]).expect("well formed")).expect("few");
+            assert_eq!(span.bits, length);
+            let key = (1 << length) - 2;
+            for last in [0, 1, 14, 15, 16, 0x3fff, 0x4000, u16::MAX] {
+                let word = key | span.told(last);
+                assert_eq!((span.key_in(word), span.last_in(word)), (key, if last > most { 0 } else { last }));
+            }
+        }
+    }
+
+    #[test]
     fn firings_that_cancel_out_need_no_bit_and_too_many_that_do_not_need_too_many() {
         let chain: Vec<Transition> = (0..99).map(|p| Transition::new(&[p], &[p + 1], &[], &[], &[])).collect();
         assert!(Span::new(&Net::new(100, chain[..60].to_vec(), &[0]).expect("well formed")).is_some());

@@ -60,7 +60,7 @@ pub struct Hit {
 /// What a search found.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
-    /// Markings found, and edges followed.
+    /// Markings found, and edges counted.
     pub found: Found,
     /// Levels that were begun.
     pub levels: usize,

@@ -1,7 +1,8 @@
 //! What the two threads of a pair share out: a set of markings in two halves.
 //!
 //! A candidate goes from thread to thread as a *record* of a few words, which says what it is and where it belongs. Which
-//! words these are is the set's affair: a key (`keyed.rs`), or a hash with a marking (`hashed.rs`).
+//! words these are is the set's affair: a key (`keyed.rs`), or a hash with a marking (`hashed.rs`); and by which transition it was
+//! found.
 
 use crate::batch::Batch;
 use crate::budget::{Memory, Stop, Watch};
@@ -90,7 +91,7 @@ impl Finds {
         });
     }
 
-    /// Whether it has found nothing in the last level, and all of that.
+    /// Whether it has found nothing more in the last level, and has expanded its share of that to the end.
     pub(crate) fn is_over(&self) -> bool {
         self.levels.last() == Some(&0) && self.end.is_none() && self.left.is_empty()
     }
@@ -164,6 +165,9 @@ pub(crate) trait Shared<W: Width>: Arrivals<W> {
     /// the finds the set holds nothing any more. After an error it holds what it held before, or needs
     /// `forget_others`.
     fn complete(&mut self, width: W, space: &mut Space, finds: [&Finds; 2]) -> Result<(), Stop>;
+
+    /// Takes the set as it was completed for good: the array holds all that it says.
+    fn seal(&mut self, space: &Space);
 
     /// Makes room for more; false where there is no memory for that. After an error the set cannot be used any
     /// more. A set that goes on from level to level is never asked.

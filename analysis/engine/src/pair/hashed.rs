@@ -298,6 +298,8 @@ impl<W: Width> Shared<W> for Hashed {
         Ok(())
     }
 
+    fn seal(&mut self, _: &Space) {}
+
     fn grow(&mut self, width: W, space: &mut Space, watch: &mut Watch<'_>) -> Result<bool, Stop> {
         let Ok(mut wider) = space.table.wider(&space.memory) else { return Ok(false) };
         let (shape, bytes) = (wider.shape(), size_of_val(wider.all_mut()));

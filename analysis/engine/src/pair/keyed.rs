@@ -1,7 +1,7 @@
 //! A set of exact keys cut in two by a parity (`parting.rs`): each thread has a table of its own side, and grows it by itself.
 //!
 //! Most firings stay on their side, so most of what a thread does is what one alone would do, in a table half as
-//! large. Of a firing that crosses a record is the key. A marking is made of that where it is new; of one's own, of the
+//! large. Of a firing that crosses a record is the key, and above it the transition. A marking is made of that where it is new; of one's own, of the
 //! marking that is fired from, which takes less. Where something is left for one thread to do, both tables are put together.
 //!
 //! The set says no indexes, so nothing is numbered before the markings stand in the array, and the threads may go on from
@@ -267,15 +267,21 @@ impl<W: Width, S: Slot> Shared<W> for ByKey<'_, S> {
         if finds.iter().all(|of| of.is_over()) {
             let halves = Halves { parting, tables: [low, high] };
             memory.claim(halves.claimed())?;
-            memory.release(whole.claimed());
-            *whole = Exact::none(self.keyed.span.bits);
-            self.keyed.halves = Some(halves);
+            self.left = Some(halves);
             return Ok(());
         }
         let joint = Exact::joint([&low, &high], memory)?;
         memory.release(whole.claimed());
         *whole = joint;
         Ok(())
+    }
+
+    fn seal(&mut self, space: &Space) {
+        if let Some(halves) = self.left.take() {
+            space.memory.release(self.keyed.exact.claimed());
+            self.keyed.exact = Exact::none(self.keyed.span.bits);
+            self.keyed.halves = Some(halves);
+        }
     }
 
     fn grow(&mut self, _: W, _: &mut Space, _: &mut Watch<'_>) -> Result<bool, Stop> {
@@ -307,7 +313,16 @@ impl<W: Width, S: Slot> Shared<W> for ByKey<'_, S> {
 
     fn forget_others(&mut self, width: W, space: &mut Space) {
         self.sides = None;
+        let left = self.left.take();
         let (span, _, exact) = self.keyed.parts();
+        if let Some(halves) = left {
+            // Without memory for that, it says less than the array holds.
+            if let Ok(joint) = halves.joint(&space.memory) {
+                space.memory.release(exact.claimed());
+                *exact = joint;
+            }
+            space.memory.release(halves.claimed());
+        }
         let (store, words) = (&space.table.store, width.words());
         let keys = || store.all()[..store.len() * words].chunks_exact(words).map(|marking| span.key(marking));
         exact.replace_by(keys, store.len(), &space.memory);
@@ -335,7 +350,23 @@ mod tests {
             let key = set.keyed.span.key(all.marking(index));
             set.keyed.exact.put(&mut set.asked, key, (&space.memory, &mut watch), || Ok(())).expect("fits");
         }
-        Shared::<Fixed<1>>::forget_others(&mut set, Fixed::<1>, &mut space);
+        for in_halves in [false, true] {
+            // What was found may still be in halves when there turns out to be no room for it.
+            if in_halves {
+                let (sleeping, mut poll) = (Sleeping::new(&space.net, &space.memory), unwatched);
+                let (span, spread, exact) = set.keyed.parts();
+                let anyhow = f64::INFINITY;
+                let parting = Parting::choose(Fixed::<1>, &space, (span, spread), [0, 0], &sleeping, anyhow);
+                sleeping.leave(&space.memory);
+                let parting = parting.expect("whatever it loses");
+                let mut watch = Watch::new(None, &mut poll);
+                let tables = [0, 1]
+                    .map(|id| exact.side(|key| parting.of_key(key) == id, &space.memory, &mut watch).expect("fits"));
+                set.left = Some(Halves { parting, tables });
+            }
+            Shared::<Fixed<1>>::forget_others(&mut set, Fixed::<1>, &mut space);
+            assert!(set.keyed.halves.is_none() && set.left.is_none());
+        }
         let stored: Vec<&[u64]> = (0..space.len()).map(|index| space.marking(index)).collect();
         assert_eq!(stored.len(), 300);
         for index in 0..all.len() {

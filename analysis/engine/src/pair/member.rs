@@ -49,7 +49,7 @@ pub(crate) struct Work<'a> {
     pub(crate) open: &'a [(usize, usize)],
     /// How many markings there are before the first that is found now.
     pub(crate) base: usize,
-    /// The fewest markings for which they go on to the next level; none where they must not.
+    /// The fewest markings for which they go on to the next level, but for a few smaller ones; none where they must not.
     pub(crate) go_on: Option<usize>,
     /// What sleeps, and by which transitions the markings found before were found.
     pub(crate) sleeping: &'a Sleeping,

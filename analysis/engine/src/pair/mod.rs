@@ -3,20 +3,20 @@
 //!
 //! The markings are cut in two, and each half has its owner, who alone looks up and files what belongs there. Each thread
 //! expands its share of a level, files the successors that are its own, and hands the others over in a buffer, once a
-//! round (`member.rs`). Rounds are measured in edges, not in time, and each thread reads what it gets in the order of the
+//! round (`member.rs`). Rounds are measured in look-ups, not in time, and each thread reads what it gets in the order of the
 //! rounds; so what a thread finds, and in which order, is a function of the net and the budget, and nothing is atomic.
 //!
 //! Where markings have exact keys (`keyed.rs`) they are cut by a parity that few firings change (`parting.rs`). Each thread
 //! then has a table of its own, as if it were alone, and goes on with what it has found itself from level to level, until
 //! levels get small or uneven; then both tables are put together, unless everything is found: the set stays in halves then
-//! until somebody asks for indexes, which most questions do not. So what it costs to start a thread and to cut a set is not
+//! as nobody needs it whole but who asks for indexes, which most questions do not. So what it costs to start a thread and to cut a set is not
 //! the price of a level. A set of hashes (`hashed.rs`) says indexes, and is cut by the highest bit of the hash, for one
 //! level.
 //!
 //! Indexes stay one numbering by levels: in each level 64 of one thread, 64 of the other, in turn, then what one has found
 //! more. Both know the index of whatever they expand from how much both have found. When they end, the markings are laid
-//! into the array in that order. So whoever asks the space afterwards sees the array and the set that one thread would
-//! leave, in another order within the levels.
+//! into the array in that order. So whoever asks the space afterwards sees the array that one thread would leave, in another
+//! order within the levels.
 //!
 //! Small levels, and the last of a budget, are left to one thread: the two share out what memory and markings there are,
 //! and the first who has used up his share ends it. Rejected: slots claimed by compare-and-swap, both threads in one
@@ -56,7 +56,7 @@ use member::{Member, Port, Work};
 /// When two threads are worth it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Worth {
-    /// The fewest markings of a level for which they are started, and of one for which they go on.
+    /// The fewest markings of a level for which they are started, and of one for which they go on, but for a few smaller ones.
     level: usize,
     next_level: usize,
     /// The largest part of their time that may be lost by the way a set is cut.
@@ -220,9 +220,10 @@ impl Pair {
             Err(stop) => Err(stop),
         };
         let result = result.and_then(|()| append(space, [&a.finds, &b.finds], &mut sleeping.trail, max));
-        if result.is_err() {
+        match result {
+            Ok(_) => set.seal(space),
             // The set says more than the array holds, which is still a prefix.
-            set.forget_others(width, space);
+            Err(_) => set.forget_others(width, space),
         }
         for member in [a, b] {
             member.finds.fresh.clear();
@@ -350,16 +351,15 @@ mod tests {
     }
 
     #[test]
-    fn two_threads_find_what_one_finds_where_markings_are_hashed() {
-        for machines_beside in [0, 5] {
-            // A chain too long for its markings to have keys.
-            let mut transitions = machines(machines_beside, 0).transitions;
-            let first = 2 * machines_beside;
-            transitions.extend((first..first + 64).map(|p| Transition::new(&[p], &[p + 1], &[], &[], &[])));
-            let marked: Vec<u32> = (0..=machines_beside).map(|i| 2 * i).collect();
-            let net = Net::new(first as usize + 65, transitions, &marked).expect("well formed");
+    fn two_threads_find_what_one_finds_where_keys_leave_no_room_or_are_too_long() {
+        // A chain makes keys long; where it makes them too long, markings are hashed, of one word and of two.
+        for (beside, length, hashed) in [(4, 50, false), (5, 55, false), (0, 61, true), (0, 64, true), (5, 64, true)] {
+            let (mut transitions, first) = (machines(beside, 0).transitions, 2 * beside);
+            transitions.extend((first..first + length).map(|p| Transition::new(&[p], &[p + 1], &[], &[], &[])));
+            let marked: Vec<u32> = (0..=beside).map(|i| 2 * i).collect();
+            let net = Net::new((first + length) as usize + 1, transitions, &marked).expect("well formed");
             let (one, two) = (alone(&net, ALL), by_two(&net, ALL));
-            assert!(matches!(two.set, Set::Hashed) && two.len() == 65 << machines_beside);
+            assert_eq!((matches!(two.set, Set::Hashed), two.len()), (hashed, (length as usize + 1) << beside));
             agree(&one, &two);
         }
     }

@@ -143,12 +143,16 @@ impl Sample {
             batch.slice(width);
             slices.push(batch.slices.clone());
             valid.push(batch.valid);
-            if first >= level {
-                asleep.cut(sleeping.trail.of(first, end.min(first + 64)));
-                for (t, asked) in asked.iter_mut().enumerate() {
-                    let fire = space.net.forward.fire(t, &batch.slices, batch.valid);
-                    *asked += i64::from((fire & !asleep.of(&sleeping.sleep, t)).count_ones());
-                }
+        }
+        let step = (end - level).div_ceil(64).div_ceil(blocks).max(1);
+        for first in (level..end).step_by(64 * step) {
+            batch.markings.clear();
+            space.table.store.copy_range(first, end.min(first + 64), &mut batch.markings);
+            batch.slice(width);
+            asleep.cut(sleeping.trail.of(first, end.min(first + 64)));
+            for (t, asked) in asked.iter_mut().enumerate() {
+                let fire = space.net.forward.fire(t, &batch.slices, batch.valid);
+                *asked += i64::from((fire & !asleep.of(&sleeping.sleep, t)).count_ones());
             }
         }
         // Place by place.
