@@ -1,8 +1,8 @@
 """Speed and memory of the explicit engine, as ratios to yardsticks in the same run.
 
-- the *limit*: as many look-ups and inserts at random as there are edges, in a table of as many keys as there are markings,
-  and nothing else (`analysis/engine/examples/random_inserts.rs`): no exploration that asks a table for each edge can be
-  quicker. The engine does not ask for each (`analysis/engine/src/sleep.rs`);
+- the *limit*: as many look-ups and inserts at random as there are edges, in a table of as many keys as there are
+  markings, and nothing else (`analysis/engine/examples/random_inserts.rs`): no exploration that asks a table for each
+  edge can be quicker. The engine does not ask for each (`analysis/engine/src/sleep.rs`);
 - for two threads, the *limit by two*: one such program against two at once, each with half of the look-ups in a table
   of half the size. They share nothing but caches and memory, and need no numbering, so this is what the machine gives;
 - `hashbrown` and `std`: the same exploration the plain way, by a mask scan into a general hash set

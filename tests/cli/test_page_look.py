@@ -25,7 +25,7 @@ def chromium() -> Iterator[Browser]:
 
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """The page of each cell: of one with every section that the protocol has, of the other with coordinators in layers."""
+    """The page of each cell: of one with every section that the protocol has, the other with its layers."""
     found = {}
     for name, also in CELLS.items():
         page = tmp_path_factory.mktemp("look") / f"{name}.html"

@@ -74,7 +74,9 @@ def test_order_applied_twice_is_told_as_that() -> None:
 def test_missing_vote_leaves_half_a_firing() -> None:
     found = refuted("missing-vote")
     # Two runs are equally short: without the vote of the one, and of the other.
-    (missing,) = (one for one in ("robot", "lathe") if f"hand_over is decided without the vote of {one}" in found.events)
+    (missing,) = (
+        one for one in ("robot", "lathe") if f"hand_over is decided without the vote of {one}" in found.events
+    )
     full = {"robot": "robot.part is full", "lathe": "lathe.empty is full"}[missing]
     assert found.sentence.startswith("no order is on its way, and unlike in the central net ")
     assert full in found.sentence
