@@ -7,9 +7,9 @@
 //!
 //! No marking is missed, and none is found later. Let m be of the next level; of all firings from this level that lead to m
 //! take one of the lowest transition, from x by t. Were it asleep, then x was found by some s before t, and s leads to m from
-//! such a y, which is of this level, or m would not be of the next: a lower one. So one firing at least that leads to m is looked up. It does not matter which of the
-//! ways to x came first, so two threads may find markings in any order, and of a marking of which no way is known
-//! nothing sleeps.
+//! such a y, which is of this level, or m would not be of the next: a lower one. So one firing at least that leads to m is
+//! looked up. It does not matter which of the ways to x came first, so two threads may find markings in any order, and of a
+//! marking of which no way is known nothing sleeps.
 //!
 //! These are sleep sets (Godefroid, "Partial-Order Methods for the Verification of Concurrent Systems", LNCS 1032, 1996,
 //! chapter 5), cut down to the last firing. Whole ones go along from marking to marking and have to be intersected whenever
