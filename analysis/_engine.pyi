@@ -148,13 +148,15 @@ class Graph:
         self,
         targets: list[int] | bytes,
         within: list[int] | bytes | None = None,
+        by: list[int] | None = None,
         *,
         max_seconds: float | None = None,
         cancelled: Callable[[], bool] | None = None,
     ) -> bytes:
         """The bitmap of the markings from which some target can be reached, targets included (EF targets).
 
-        With `within`, every marking before the target is in it (E[within U targets]). Needs the whole graph.
+        With `within`, every marking before the target is in it (E[within U targets]); with `by`, by edges that fire one
+        of these transitions. Needs the whole graph.
         """
     def before(
         self,
@@ -477,8 +479,13 @@ class Diagram:
         """The markings of a set in contact at some transition."""
     def before(self, targets: MarkingSet, by: list[int] | None = None) -> MarkingSet:
         """The markings with an edge into the targets (EX); with `by`, an edge that fires one of these transitions."""
-    def backward(self, targets: MarkingSet, within: MarkingSet | None = None) -> MarkingSet:
-        """The markings from which a target can be reached (EF), going only through `within` (E[within U targets])."""
+    def backward(
+        self, targets: MarkingSet, within: MarkingSet | None = None, by: list[int] | None = None
+    ) -> MarkingSet:
+        """The markings from which a target can be reached (EF), going only through `within` (E[within U targets]).
+
+        With `by`, by firings of these transitions alone.
+        """
     def forward(self, sources: MarkingSet) -> MarkingSet:
         """The markings that can be reached from a set."""
     def endless(self, within: MarkingSet) -> MarkingSet:

@@ -229,9 +229,13 @@ class ReachabilityGraph(Derived["Column"]):
         bitmap = self.engine.before(targets.tobytes(), None if by is None else list(by), **self._limits)
         return _column(bitmap)
 
-    def backward(self, targets: Column, within: Column | None = None) -> Column:
-        """The markings from which a target can be reached (EF), going only through `within` (E[within U targets])."""
-        bitmap = self.engine.backward(targets.tobytes(), None if within is None else within.tobytes(), **self._limits)
+    def backward(self, targets: Column, within: Column | None = None, by: Iterable[int] | None = None) -> Column:
+        """The markings from which a target can be reached (EF), going only through `within` (E[within U targets]).
+
+        With `by`, by edges that fire one of these transitions.
+        """
+        inside = None if within is None else within.tobytes()
+        bitmap = self.engine.backward(targets.tobytes(), inside, None if by is None else list(by), **self._limits)
         return _column(bitmap)
 
     def endless(self, within: Column | None = None) -> Column:

@@ -131,8 +131,11 @@ class StateSpace(Protocol[S]):
         """The markings with an edge into the targets (EX); with `by`, an edge that fires one of these transitions."""
         ...
 
-    def backward(self, targets: S, within: S | None = None) -> S:
-        """The markings from which a target can be reached (EF), going only through `within` (E[within U targets])."""
+    def backward(self, targets: S, within: S | None = None, by: Iterable[int] | None = None) -> S:
+        """The markings from which a target can be reached (EF), going only through `within` (E[within U targets]).
+
+        With `by`, by edges that fire one of these transitions.
+        """
         ...
 
     def endless(self, within: S | None = None) -> S:

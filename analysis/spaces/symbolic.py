@@ -175,9 +175,14 @@ class SymbolicSpace(Derived[MarkingSet]):
         """The markings with an edge into the targets (EX); with `by`, an edge that fires one of these transitions."""
         return self.engine.before(targets, None if by is None else sorted(set(by)))
 
-    def backward(self, targets: MarkingSet, within: MarkingSet | None = None) -> MarkingSet:
-        """The markings from which a target can be reached (EF), going only through `within` (E[within U targets])."""
-        return self.engine.backward(targets, within)
+    def backward(
+        self, targets: MarkingSet, within: MarkingSet | None = None, by: Iterable[int] | None = None
+    ) -> MarkingSet:
+        """The markings from which a target can be reached (EF), going only through `within` (E[within U targets]).
+
+        With `by`, by edges that fire one of these transitions.
+        """
+        return self.engine.backward(targets, within, None if by is None else sorted(set(by)))
 
     def endless(self, within: MarkingSet | None = None) -> MarkingSet:
         """The markings from which a run can go on for ever inside `within` (EG over infinite runs only)."""

@@ -8,15 +8,12 @@ Weijland 1996) between the protocol, all steps hidden by which nothing fires, an
 - from each configuration, for each transition that its central marking may fire, some hidden steps lead to one where it
   fires. That is what is decided here. The central marking does not change on the way, which makes it *branching*.
 
-The relation is a function of the configuration, so no partition has to be refined, and one closure for each marking of
-the central net decides it, in a table or in a diagram. In the true protocol two arguments make it quicker still: all
-configurations of a central marking lead *home*, to one where nothing is asked, promised or on its way, and the votes of
-parts that are free of promise are heard. From there the transition is asked for, promised, heard and decided, a run
-that is written down and played by the reference player.
-Where this does not succeed, the closures are made for each transition.
-
-A transition without inputs and outputs changes no marking when it fires, so the closure within one central marking
-would take it for hidden; with such nets the closure goes back by hidden steps alone, one at a time.
+The relation is a function of the configuration, so no partition has to be refined, and closures by hidden steps decide
+it, in a table or in a diagram. In the true protocol two arguments make it quick: all configurations lead *home*, to one
+where nothing is asked, promised or on its way, which one closure shows of all central markings at once, since no hidden
+step changes it; and the votes of parts that are free of promise are heard. From there the transition is asked for,
+promised, heard and decided, a run that is written down and played by the reference player.
+Where this does not succeed, a closure is made for each transition and central marking.
 
 Under faults the same is asked with the faults hidden, of the configurations where faults have ceased: to cease is a
 hidden step. Something is lost if no restart comes.
@@ -25,6 +22,7 @@ hidden step. Something is lost if no restart comes.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import cached_property
 from typing import Any, Final, NamedTuple
 
 from firable.analysis.goal import Limits
@@ -87,21 +85,27 @@ class _Completeness:
     def __init__(self, protocol: ProtocolNet, space: StateSpace[Any]) -> None:
         self.protocol, self.space = protocol, space
         self.net, self.central = protocol.net, protocol.parts.net
-        self.plain = all(t.inputs or t.outputs for t in protocol.parts.transitions)
         self.quiet = space.satisfying(protocol.quiet)
         outside = [Holds(ASTRAY), *([Holds(GO_ON)] if GO_ON in self.net.place_index else [])]
-        self.outside = space.satisfying(Or(tuple(outside)))
+        self.asked = space.algebra.negation(space.satisfying(Or(tuple(outside))))
         self.player = Player(self.net)
         self.witnesses = Witnesses(self.net, Discipline.INTERLEAVING)
+
+    @cached_property
+    def astray(self) -> Any:
+        """The configurations that are asked about, and do not lead home."""
+        algebra = self.space.algebra
+        home = algebra.conjunction([self.asked, self.quiet])
+        return algebra.conjunction([self.asked, algebra.negation(self._leading_to(home, self.asked))])
 
     def lost_in(self, marking: Marking, may_fire: tuple[int, ...]) -> Iterator[Lost]:
         """What is lost in the configurations of one central marking."""
         algebra = self.space.algebra
-        inside = algebra.conjunction([carrying(self.space, self.central, marking), algebra.negation(self.outside)])
-        if not may_fire or not self.space.count(inside):
+        starts = all(map(self._starts_from_home(marking), may_fire))
+        if starts and not self.space.count(self.astray):
             return
-        home = algebra.conjunction([inside, self.quiet])
-        if all(map(self._starts_from_home(marking), may_fire)) and self._all_lead_to(home, inside):
+        inside = algebra.conjunction([carrying(self.space, self.central, marking), self.asked])
+        if starts and not self.space.count(algebra.conjunction([inside, self.astray])):
             return
         for t in may_fire:
             name = self.central.transitions[t].name
@@ -112,22 +116,8 @@ class _Completeness:
             if witness is not None:
                 yield Lost(name, witness)
 
-    def _all_lead_to(self, targets: Any, inside: Any) -> bool:
-        if not self.space.count(targets):
-            return False
-        return self.space.count(self._leading_to(targets, inside)) == self.space.count(inside)
-
     def _leading_to(self, targets: Any, inside: Any) -> Any:
-        algebra = self.space.algebra
-        if self.plain:
-            return self.space.backward(targets, inside)
-        reached = targets
-        while True:
-            before = self.space.before(reached, self.protocol.hidden)
-            larger = algebra.disjunction([reached, algebra.conjunction([before, inside])])
-            if self.space.count(larger) == self.space.count(reached):
-                return reached
-            reached = larger
+        return self.space.backward(targets, inside, self.protocol.hidden)
 
     def _starts_from_home(self, marking: Marking) -> Any:
         names = self.central.names(marking)

@@ -97,6 +97,10 @@ def test_a_space_has_the_sets_of_the_oracle(name: str, net: Net, data: st.DataOb
     same(space.before(targets[0], by), oracle.before(targets[1], by))
     same(space.backward(targets[0]), oracle.backward(targets[1]))
     same(space.backward(targets[0], within[0]), oracle.backward(targets[1], within[1]))
+    same(space.backward(targets[0], by=by), oracle.backward(targets[1], by=by))
+    same(space.backward(targets[0], within[0], by), oracle.backward(targets[1], within[1], by))
+    others = set(transitions) - by
+    same(space.backward(targets[0], within[0], others), oracle.backward(targets[1], within[1], others))
     same(space.endless(within[0]), oracle.endless(within[1]))
     witness = space.witness(targets[0], "here")
     assert witness is not None

@@ -118,6 +118,25 @@ def test_partition_refinement_and_closures_both_see_what_a_dead_controller_loses
     assert not branching_bisimilar(found.space, explore(net), visible(found.protocol), labels, divergence=False)
 
 
+@pytest.mark.parametrize("held", ["table", "diagram"])
+def test_what_only_a_firing_leads_back_to_is_lost(held: str) -> None:
+    """A protocol that keeps to G once it has asked for it: l is lost, though G fires and all is quiet again."""
+    whole = protocol_net(split(load_net("local_conflict")))
+    kept = [
+        replace(t, inhibitive=(*t.inhibitive, "asked/G")) if t.name.startswith("decide/l") else t
+        for t in whole.net.transitions
+        if whole.steps[t.name].kind != "give-up"
+    ]
+    protocol = replace(whole, net=replace(whole.net, transitions=tuple(kept)))
+    space = explore(protocol.net) if held == "table" else _diagram(protocol)
+    lost = Exploration(protocol, space).lost
+    assert lost is not None
+    assert lost.transition == "l"
+    assert lost.witness.firings == (("ask/G",),)
+    asked = protocol.net.marking(lost.witness.marking)
+    assert space.contains(space.backward(space.satisfying(protocol.quiet)), asked)
+
+
 def test_whole_cell_is_explored_as_a_diagram_and_refines() -> None:
     found = explore_protocol(load_net("cell1"))
     assert statuses(found) == {Status.PROVED}

@@ -269,6 +269,13 @@ def test_one_edge_back_is_that_of_the_definition(net: Drawn, step: bool, data: s
     ]
     assert graph.before(bitmap(graph, targets)) == bytes(bool(edges) for edges in fired_into)
     assert graph.before(sorted(targets), sorted(by)) == bytes(any(f & by for f in edges) for edges in fired_into)
+    within = data.draw(st.sets(st.integers(0, graph.n_markings - 1)))
+    can, bigger = set(targets), True
+    while bigger:
+        there = {graph.marking(i) for i in can}
+        more = {i for i in within if any(f & by and after in there for f, after in naive.graph[graph.marking(i)])}
+        can, bigger = can | more, not more <= can
+    assert graph.backward(sorted(targets), sorted(within), sorted(by)) == bitmap(graph, can)
 
 
 @examples(63)

@@ -115,10 +115,10 @@ class NaiveSpace(Derived[Markings]):
             if any(after in targets and (wanted is None or wanted & set(fired)) for fired, after in edges)
         )
 
-    def backward(self, targets: Markings, within: Markings | None = None) -> Markings:
-        """The least set with the targets, and the markings of `within` that have an edge into it."""
-        found = targets
-        while more := (self.before(found) & (frozenset(self.graph) if within is None else within)) - found:
+    def backward(self, targets: Markings, within: Markings | None = None, by: Iterable[int] | None = None) -> Markings:
+        """The least set with the targets, and the markings of `within` that have an edge into it, as for `before`."""
+        found, some = targets, None if by is None else set(by)
+        while more := (self.before(found, some) & (frozenset(self.graph) if within is None else within)) - found:
             found |= more
         return found
 

@@ -5,7 +5,7 @@
 
 use crate::batch::Batch;
 use crate::budget::{Memory, Stop, Watch};
-use crate::edges::Edges;
+use crate::edges::{Edges, Fired};
 use crate::exact::ROOM;
 use crate::explore::Space;
 use crate::fan::Fan;
@@ -49,28 +49,24 @@ impl Csr {
             targets.try_reserve_exact(edges).map_err(|_| Stop::Memory)?;
         }
         if space.step {
-            let mut edges = Edges::new(space);
-            let mut sources = Vec::with_capacity(64);
-            for first in (0..count).step_by(64) {
-                sources.clear();
-                sources.extend((first as u32..count.min(first + 64) as u32).filter(|&source| inside(source)));
-                edges.visit(&sources, memory, watch, &mut |source, _, target| {
-                    if inside(target) {
-                        offsets[source as usize + 1] += 1;
-                        memory.push(&mut targets, target)?;
-                    }
-                    Ok(())
-                })?;
-            }
-            edges.finish(memory);
-            for index in 0..count {
-                offsets[index + 1] += offsets[index];
-            }
+            fill_steps(space, inside, |_| true, &mut offsets, &mut targets, memory, watch)?;
         } else {
             with_width!(space.net.words, width => {
                 fill(width, space, within, &mut offsets, &mut targets, memory, watch)
             })?;
         }
+        Ok(Csr { offsets, targets: Region::Heap(targets) })
+    }
+
+    /// Stores the steps that fire such transitions.
+    pub fn of_steps(
+        space: &Space,
+        such: impl Fn(Fired<'_>) -> bool,
+        memory: &Memory,
+        watch: &mut Watch<'_>,
+    ) -> Result<Self, Stop> {
+        let (mut offsets, mut targets) = (memory.filled(0u64, space.len() + 1)?, Vec::new());
+        fill_steps(space, |_| true, such, &mut offsets, &mut targets, memory, watch)?;
         Ok(Csr { offsets, targets: Region::Heap(targets) })
     }
 
@@ -102,6 +98,37 @@ impl Csr {
         offsets.pop();
         Ok(Csr { offsets, targets: Region::Heap(sources) })
     }
+}
+
+/// The rows under steps, of those within some markings that fire such transitions.
+fn fill_steps(
+    space: &Space,
+    inside: impl Fn(u32) -> bool,
+    such: impl Fn(Fired<'_>) -> bool,
+    offsets: &mut [u64],
+    targets: &mut Vec<u32>,
+    memory: &Memory,
+    watch: &mut Watch<'_>,
+) -> Result<(), Stop> {
+    let count = space.len();
+    let mut edges = Edges::new(space);
+    let mut sources = Vec::with_capacity(64);
+    for first in (0..count).step_by(64) {
+        sources.clear();
+        sources.extend((first as u32..count.min(first + 64) as u32).filter(|&source| inside(source)));
+        edges.visit(&sources, memory, watch, &mut |source, fired, target| {
+            if inside(target) && such(fired) {
+                offsets[source as usize + 1] += 1;
+                memory.push(targets, target)?;
+            }
+            Ok(())
+        })?;
+    }
+    edges.finish(memory);
+    for index in 0..count {
+        offsets[index + 1] += offsets[index];
+    }
+    Ok(())
 }
 
 /// All rows of a whole graph under interleaving, where markings have keys. What fires at 64 markings is turned, so that

@@ -21,8 +21,14 @@ use crate::marking::Width;
 use crate::with_width;
 
 /// The markings from which a target can be reached, one byte each, targets included; every marking on the way before
-/// the target is in `within`.
-pub fn backward(space: &Space, targets: &[u8], within: Option<&[u8]>, watch: &mut Watch<'_>) -> Result<Vec<u8>, Stop> {
+/// the target is in `within`; with `by`, by edges that fire one of these transitions.
+pub fn backward(
+    space: &Space,
+    targets: &[u8],
+    within: Option<&[u8]>,
+    by: Option<&[u32]>,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<u8>, Stop> {
     let memory = space.memory.clone();
     let mut reach = Bits::from_bytes(targets, &memory)?;
     let mut agenda = Agenda::new(space.len(), &memory)?;
@@ -33,7 +39,11 @@ pub fn backward(space: &Space, targets: &[u8], within: Option<&[u8]>, watch: &mu
     };
     let mut taken = Vec::with_capacity(64);
     if space.step {
-        let edges = Csr::new(space, None, &memory, watch)?.reversed(&memory, watch)?;
+        let edges = match by {
+            None => Csr::new(space, None, &memory, watch)?,
+            Some(_) => Csr::of_steps(space, one_of(space, by), &memory, watch)?,
+        };
+        let edges = edges.reversed(&memory, watch)?;
         while agenda.take(&mut taken) {
             for &index in &taken {
                 let sources = edges.targets(index);
@@ -47,13 +57,13 @@ pub fn backward(space: &Space, targets: &[u8], within: Option<&[u8]>, watch: &mu
             }
         }
     } else {
-        let transitions = space.net.transitions.len();
+        let transitions = transitions(space, by);
         let mut fan = Fan::backward(space, watch)?;
         with_width!(space.net.words, width => {
             while agenda.take(&mut taken) {
                 let mut edges = 0;
                 fan.load(width, &taken);
-                fan.each(width, !0, 0..transitions, &mut |_, _, source| {
+                fan.each(width, !0, transitions.iter().copied(), &mut |_, _, source| {
                     edges += 1;
                     if open(&reach, source) {
                         reach.add(source as usize);
@@ -61,11 +71,29 @@ pub fn backward(space: &Space, targets: &[u8], within: Option<&[u8]>, watch: &mu
                     }
                     false
                 });
-                watch.tick(taken.len() + edges + transitions)?;
+                watch.tick(taken.len() + edges + transitions.len())?;
             }
         });
     }
     Ok(reach.to_bytes(space.len()))
+}
+
+/// These transitions, or all.
+fn transitions(space: &Space, by: Option<&[u32]>) -> Vec<usize> {
+    match by {
+        Some(by) => by.iter().map(|&t| t as usize).collect(),
+        None => (0..space.net.transitions.len()).collect(),
+    }
+}
+
+/// Whether one of these transitions fires on an edge.
+fn one_of(space: &Space, by: Option<&[u32]>) -> impl Fn(Fired<'_>) -> bool {
+    let marked = by.map(|by| {
+        let mut marked = vec![false; space.net.transitions.len()];
+        by.iter().for_each(|&t| marked[t as usize] = true);
+        marked
+    });
+    move |fired| marked.as_ref().is_none_or(|marked| fired.any(|t| marked[t as usize]))
 }
 
 /// The markings with an edge into the targets, one byte each; with `by`, an edge that fires one of these transitions.
@@ -73,12 +101,7 @@ pub fn before(space: &Space, targets: &[u8], by: Option<&[u32]>, watch: &mut Wat
     let memory = space.memory.clone();
     let mut found = memory.filled(0u8, space.len())?;
     if space.step {
-        let by = by.map(|by| {
-            let mut marked = vec![false; space.net.transitions.len()];
-            by.iter().for_each(|&t| marked[t as usize] = true);
-            marked
-        });
-        let fires = |fired: Fired<'_>| by.as_ref().is_none_or(|by| fired.any(|t| by[t as usize]));
+        let fires = one_of(space, by);
         let mut edges = Edges::new(space);
         for index in 0..space.len() as u32 {
             edges.visit(&[index], &memory, watch, &mut |source, fired, target| {
@@ -90,10 +113,7 @@ pub fn before(space: &Space, targets: &[u8], by: Option<&[u32]>, watch: &mut Wat
         }
         return Ok(found);
     }
-    let transitions: Vec<usize> = match by {
-        Some(by) => by.iter().map(|&t| t as usize).collect(),
-        None => (0..space.net.transitions.len()).collect(),
-    };
+    let transitions = transitions(space, by);
     let count = targets.iter().filter(|&&target| target != 0).count();
     with_width!(space.net.words, width => {
         if count < space.len() / 4 {

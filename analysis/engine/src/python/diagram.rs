@@ -22,7 +22,7 @@ use crate::symbolic::algebra::Binary;
 use crate::symbolic::cache::ANY;
 use crate::symbolic::count::Natural;
 use crate::symbolic::listing::Listing;
-use crate::symbolic::space::{Events, Symbolic};
+use crate::symbolic::space::{By, Events, Symbolic};
 use crate::symbolic::zdd::{EMPTY, Node};
 
 struct Shared {
@@ -187,6 +187,13 @@ impl Diagram {
         places.iter().try_for_each(|&place| self.place(place).map(|_| ()))
     }
 
+    fn fired<'a>(&self, mut some: impl Iterator<Item = &'a usize>) -> PyResult<()> {
+        match some.find(|&&t| t >= self.transitions) {
+            Some(t) => Err(PyIndexError::new_err(format!("there is no transition {t} of {}", self.transitions))),
+            None => Ok(()),
+        }
+    }
+
     fn mine(&self, set: &MarkingSet) -> PyResult<Node> {
         if Arc::ptr_eq(&self.shared, &set.shared) {
             Ok(set.node)
@@ -264,28 +271,33 @@ impl Diagram {
     #[pyo3(signature = (targets, by=None))]
     fn before(&self, py: Python<'_>, targets: &MarkingSet, by: Option<Vec<usize>>) -> PyResult<MarkingSet> {
         let set = self.mine(targets)?;
-        if let Some(&t) = by.iter().flatten().find(|&&t| t >= self.transitions) {
-            return Err(PyIndexError::new_err(format!("there is no transition {t} of {}", self.transitions)));
-        }
+        self.fired(by.iter().flatten())?;
         self.shared.set(py, |space, roots, watch| match by {
             None => space.before(roots, set, watch),
             Some(by) => space.before_by(roots, set, &by, watch),
         })
     }
 
-    #[pyo3(signature = (targets, within=None))]
-    fn backward(&self, py: Python<'_>, targets: &MarkingSet, within: Option<&MarkingSet>) -> PyResult<MarkingSet> {
+    #[pyo3(signature = (targets, within=None, by=None))]
+    fn backward(
+        &self,
+        py: Python<'_>,
+        targets: &MarkingSet,
+        within: Option<&MarkingSet>,
+        by: Option<Vec<usize>>,
+    ) -> PyResult<MarkingSet> {
         let set = self.mine(targets)?;
+        self.fired(by.iter().flatten())?;
         let within = within.map(|within| self.mine(within)).transpose()?;
         self.shared.set(py, |space, roots, watch| {
             let within = within.unwrap_or(space.reach);
-            space.backward(roots, set, within, watch)
+            space.backward(roots, set, within, by.as_deref(), watch)
         })
     }
 
     fn forward(&self, py: Python<'_>, sources: &MarkingSet) -> PyResult<MarkingSet> {
         let set = self.mine(sources)?;
-        self.shared.set(py, |space, roots, watch| space.closure(roots, set, ANY, false, watch))
+        self.shared.set(py, |space, roots, watch| space.closure(roots, set, ANY, By::Forward, watch))
     }
 
     fn endless(&self, py: Python<'_>, within: &MarkingSet) -> PyResult<MarkingSet> {

@@ -70,6 +70,10 @@ impl Graph {
         if t < count { Ok(t) } else { Err(PyIndexError::new_err(format!("there is no transition {t} of {count}"))) }
     }
 
+    fn check_transitions(&self, some: Vec<usize>) -> PyResult<Vec<u32>> {
+        some.into_iter().map(|t| Ok(self.check_transition(t)? as u32)).collect()
+    }
+
     fn bitmap(&self, markings: Markings<'_>) -> PyResult<Vec<u8>> {
         match markings {
             Markings::Bitmap(bytes) if bytes.as_bytes().len() == self.space.len() => Ok(bytes.as_bytes().to_vec()),
@@ -257,12 +261,13 @@ impl Graph {
         Ok(found)
     }
 
-    #[pyo3(signature = (targets, within=None, *, max_seconds=None, cancelled=None))]
+    #[pyo3(signature = (targets, within=None, by=None, *, max_seconds=None, cancelled=None))]
     fn backward<'py>(
         &self,
         py: Python<'py>,
         targets: Markings<'_>,
         within: Option<Markings<'_>>,
+        by: Option<Vec<usize>>,
         max_seconds: Option<f64>,
         cancelled: Option<Py<PyAny>>,
     ) -> PyResult<Bound<'py, PyBytes>> {
@@ -270,8 +275,10 @@ impl Graph {
         self.whole("backward reach")?;
         let targets = self.bitmap(targets)?;
         let within = within.map(|within| self.bitmap(within)).transpose()?;
-        let reach =
-            self.long(py, &patience, |space, watch| fixpoints::backward(space, &targets, within.as_deref(), watch))?;
+        let by = by.map(|by| self.check_transitions(by)).transpose()?;
+        let reach = self.long(py, &patience, |space, watch| {
+            fixpoints::backward(space, &targets, within.as_deref(), by.as_deref(), watch)
+        })?;
         Ok(PyBytes::new(py, &reach))
     }
 
@@ -357,10 +364,7 @@ impl Graph {
         let patience = Patience::new(max_seconds, cancelled)?;
         self.whole("what leads to a set of markings")?;
         let targets = self.bitmap(targets)?;
-        let check = |by: Vec<usize>| -> PyResult<Vec<u32>> {
-            by.into_iter().map(|t| Ok(self.check_transition(t)? as u32)).collect()
-        };
-        let by = by.map(check).transpose()?;
+        let by = by.map(|by| self.check_transitions(by)).transpose()?;
         let found =
             self.long(py, &patience, |space, watch| fixpoints::before(space, &targets, by.as_deref(), watch))?;
         Ok(PyBytes::new(py, &found))

@@ -28,10 +28,14 @@ pub enum Op {
     Fire,
     /// The same, of the predecessors.
     FireBack,
+    /// The same, of the predecessors by some transitions alone.
+    FireSome,
     /// A fixed point at a level; the operand is a level, then a node, then a constraint.
     Fix,
     /// The same, of the predecessors.
     FixBack,
+    /// The same, of the predecessors by some transitions alone.
+    FixSome,
     /// An image; the operand is a suffix, then a node.
     Image,
     /// The image under a whole table; the operand is the number of the table, then a node.
@@ -142,6 +146,15 @@ impl Cache {
         self.inserted = 0;
         self.grow_at = old * WAYS;
         Ok(())
+    }
+
+    /// Forgets every result of some operations.
+    pub fn forget(&mut self, ops: &[Op]) {
+        for entry in self.lines.all_mut().iter_mut().flatten() {
+            if ops.iter().any(|&op| entry[0] >> 28 == op as u32) {
+                *entry = BLANK;
+            }
+        }
     }
 
     /// Forgets every result that speaks of a node no longer in use.

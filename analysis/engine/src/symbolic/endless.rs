@@ -27,7 +27,7 @@
 use std::collections::HashMap;
 
 use super::algebra::Binary;
-use super::space::{Events, Symbolic};
+use super::space::{By, Events, Symbolic};
 use super::walk::{Marking, Moves, holds, tokens};
 use super::zdd::{EMPTY, Node, TERMINAL};
 use crate::budget::{Stop, Watch};
@@ -89,7 +89,7 @@ impl Symbolic {
                     in_vain += 1;
                     continue;
                 }
-                let leading = self.closure(&[held, vec![cycling]].concat(), cycling, left, true, watch)?;
+                let leading = self.closure(&[held, vec![cycling]].concat(), cycling, left, By::Backward, watch)?;
                 let held = [roots, &[found, left, leading]].concat();
                 found = self.binary(&held, Binary::Union, found, leading, watch)?;
                 left = self.binary(&[held, vec![found]].concat(), Binary::Difference, left, leading, watch)?;

@@ -4,7 +4,7 @@
 //! remembered, the first by the suffix that was fired and the second by the node that it started from, since what
 //! different events leave is often the same. A result that is known needs no frame, and most are.
 
-use super::cache::{ANY, Op};
+use super::cache::ANY;
 use super::events::{DONE, SATURATE, Suffix};
 use super::saturation::{Frame, Saturation, Step, Workshop};
 use super::values::{Value, closed, opened};
@@ -12,10 +12,6 @@ use super::zdd::{EMPTY, Node};
 use crate::budget::{Stop, Watch};
 
 impl Saturation {
-    pub(super) fn ops(&self) -> (Op, Op) {
-        if self.back { (Op::FireBack, Op::FixBack) } else { (Op::Fire, Op::Fix) }
-    }
-
     /// The saturated image closed up to a block, if it needs no search.
     #[inline]
     pub(super) fn known(&self, shop: &Workshop<'_>, suffix: Suffix, node: Node, within: Node, to: u32) -> Option<Node> {
@@ -44,7 +40,7 @@ impl Saturation {
             return Some(if within == EMPTY { EMPTY } else { node });
         }
         // What is moved below another constraint need not be closed there.
-        shop.diagram.cache.get(self.ops().0, suffix.max(SATURATE), node, within)
+        shop.diagram.cache.get(self.by.ops().0, suffix.max(SATURATE), node, within)
     }
 
     /// Fires a suffix on a node that is to be closed up to a block.
@@ -176,10 +172,10 @@ impl Saturation {
         let fixed = if start == EMPTY || shop.agenda.at(block).is_empty() {
             Some(start)
         } else {
-            shop.diagram.cache.get(self.ops().1, block, start, within)
+            shop.diagram.cache.get(self.by.ops().1, block, start, within)
         };
         if let Some(result) = fixed {
-            shop.diagram.cache.put(&shop.diagram.store.memory, self.ops().0, suffix, node, within, result)?;
+            shop.diagram.cache.put(&shop.diagram.store.memory, self.by.ops().0, suffix, node, within, result)?;
             self.leave(base, result);
             return Ok(());
         }
@@ -198,7 +194,7 @@ impl Saturation {
     }
 
     pub(super) fn fix(&mut self, shop: &mut Workshop<'_>, block: u32, node: Node, within: Node) -> Result<(), Stop> {
-        if let Some(known) = shop.diagram.cache.get(self.ops().1, block, node, within) {
+        if let Some(known) = shop.diagram.cache.get(self.by.ops().1, block, node, within) {
             self.step = Step::Return(known);
             return Ok(());
         }
@@ -254,7 +250,7 @@ impl Saturation {
             values.sort_unstable_by_key(|value| value.bits);
             result = closed(&mut shop.diagram.store, values, shop.blocks.low(block), start)?;
         }
-        shop.diagram.cache.put(&shop.diagram.store.memory, self.ops().1, block, start, within, result)?;
+        shop.diagram.cache.put(&shop.diagram.store.memory, self.by.ops().1, block, start, within, result)?;
         self.leave(base as usize, result);
         Ok(())
     }

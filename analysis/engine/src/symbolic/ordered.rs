@@ -8,6 +8,7 @@ use super::blocks::{Blocks, Literals};
 use super::events::{Sense, Suffix, Suffixes, Table, contact_literals, literals};
 use super::order::Order;
 use super::parts::{Agenda, Parts};
+use super::saturation::By;
 use super::zdd::Node;
 use crate::budget::{Memory, Stop};
 use crate::net::Transition;
@@ -37,8 +38,10 @@ pub(super) struct Ordered {
     pub(super) tables: [Option<Table>; 4],
     pub(super) blocks: Blocks,
     pub(super) parts: Parts,
-    /// The firings by block, and the same backwards.
-    pub(super) agendas: [Option<Agenda>; 2],
+    /// The firings by block, by what closures go by.
+    pub(super) agendas: [Option<Agenda>; 3],
+    /// The transitions of the last of them.
+    chosen: Vec<usize>,
     claimed: usize,
 }
 
@@ -63,25 +66,38 @@ impl Ordered {
             tables: [const { None }; 4],
             blocks,
             parts: Parts::default(),
-            agendas: [const { None }; 2],
+            agendas: [const { None }; 3],
+            chosen: Vec::new(),
             level_of,
             place_at,
             claimed: 0,
         };
-        ordered.agendas[0] = Some(Agenda::new(&mut ordered.parts, &firings, &ordered.blocks)?);
+        ordered.agendas[By::Forward as usize] = Some(Agenda::new(&mut ordered.parts, &firings, &ordered.blocks)?);
         ordered.claim()?;
         Ok(ordered)
     }
 
-    /// The firings by block, or the same backwards.
-    pub(super) fn agenda(&mut self, back: bool, transitions: &[Transition]) -> Result<(), Stop> {
-        if self.agendas[usize::from(back)].is_none() {
-            let sense = if back { Sense::Backward } else { Sense::Forward };
+    /// Makes the agenda of what a closure goes by; that of chosen transitions is made by `choose`.
+    pub(super) fn agenda(&mut self, by: By, transitions: &[Transition]) -> Result<(), Stop> {
+        if self.agendas[by as usize].is_none() {
+            let sense = if by == By::Forward { Sense::Forward } else { Sense::Backward };
             let firings = Literals::new(transitions, &self.level_of, sense);
-            self.agendas[usize::from(back)] = Some(Agenda::new(&mut self.parts, &firings, &self.blocks)?);
+            self.agendas[by as usize] = Some(Agenda::new(&mut self.parts, &firings, &self.blocks)?);
             self.claim()?;
         }
         Ok(())
+    }
+
+    /// Makes the agenda of the firings of some transitions, backwards, and forgets what was found by others.
+    pub(super) fn choose(&mut self, transitions: &[Transition], some: &[usize]) -> Result<(), Stop> {
+        if self.chosen != some {
+            let (fire, fix) = By::Chosen.ops();
+            self.diagram.cache.forget(&[fire, fix]);
+            self.agendas[By::Chosen as usize] = None;
+            self.chosen = some.to_vec();
+        }
+        let its: Vec<Transition> = some.iter().map(|&t| transitions[t].clone()).collect();
+        self.agenda(By::Chosen, &its)
     }
 
     /// Claims the bytes of what was made of the transitions.

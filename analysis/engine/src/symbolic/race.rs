@@ -17,7 +17,7 @@
 use super::cache::ANY;
 use super::order::{Order, candidates};
 use super::ordered::Ordered;
-use super::saturation::{Saturation, Workshop};
+use super::saturation::{By, Saturation, Workshop};
 use super::space::Symbolic;
 use super::zdd::Node;
 use crate::budget::{Stop, Watch};
@@ -89,13 +89,13 @@ impl Racer {
             none => {
                 let mut ordered = Ordered::new(transitions, initial, &self.order, room)?;
                 let start = ordered.single(initial)?;
-                let search = Saturation::new(&ordered.diagram, &ordered.blocks, start, ANY, false)?;
+                let search = Saturation::new(&ordered.diagram, &ordered.blocks, start, ANY, By::Forward)?;
                 none.insert((ordered, search, start))
             }
         };
         ordered.diagram.store.memory.allow(room);
         let Ordered { diagram, blocks, parts, agendas, .. } = ordered;
-        let Some(agenda) = &agendas[0] else { return Ok(None) };
+        let Some(agenda) = &agendas[By::Forward as usize] else { return Ok(None) };
         search.run(&mut Workshop { diagram, blocks, parts, agenda, roots: &[*start] }, fuel, watch)
     }
 }

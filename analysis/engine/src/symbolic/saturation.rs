@@ -22,7 +22,7 @@
 
 use super::algebra::Diagram;
 use super::blocks::Blocks;
-use super::cache::ANY;
+use super::cache::{ANY, Op};
 use super::events::{SATURATE, Suffix};
 use super::parts::{Agenda, Parts};
 use super::values::Value;
@@ -62,13 +62,35 @@ pub(super) enum Step {
     Go,
 }
 
+/// What a closure goes by; the results of one are not those of another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum By {
+    /// All firings.
+    Forward,
+    /// All firings, from the marking after to the one before.
+    Backward,
+    /// The same, of the transitions that were chosen.
+    Chosen,
+}
+
+impl By {
+    /// A saturated image, and a fixed point.
+    pub(super) fn ops(self) -> (Op, Op) {
+        match self {
+            By::Forward => (Op::Fire, Op::Fix),
+            By::Backward => (Op::FireBack, Op::FixBack),
+            By::Chosen => (Op::FireSome, Op::FixSome),
+        }
+    }
+}
+
 /// A saturation in progress.
 #[derive(Debug)]
 pub(super) struct Saturation {
     pub(super) frames: Vec<Frame>,
     pub(super) values: Vec<Value>,
     pub(super) step: Step,
-    pub(super) back: bool,
+    pub(super) by: By,
     pub(super) events: u64,
 }
 
@@ -112,13 +134,13 @@ impl Workshop<'_> {
 impl Saturation {
     /// The closure of a set under the events of an agenda, within a constraint (`ANY`: none).
     ///
-    /// `back` keeps the results of the two directions apart. All of the set outside the constraint is left out.
-    pub(super) fn new(diagram: &Diagram, blocks: &Blocks, set: Node, within: Node, back: bool) -> Result<Self, Stop> {
+    /// The agenda is that of what it goes by. All of the set outside the constraint is left out.
+    pub(super) fn new(diagram: &Diagram, blocks: &Blocks, set: Node, within: Node, by: By) -> Result<Self, Stop> {
         let mut frames = Vec::new();
         let from = blocks.of(diagram.store.level(set));
         diagram.store.memory.push(&mut frames, Frame::Close { from, to: blocks.len() as u32, within })?;
         let step = Step::Fire { suffix: SATURATE, node: set, within };
-        Ok(Saturation { frames, values: Vec::new(), step, back, events: 0 })
+        Ok(Saturation { frames, values: Vec::new(), step, by, events: 0 })
     }
 
     /// How many events were fired on some node.
@@ -220,7 +242,7 @@ impl Saturation {
                 self.step = Step::Go;
             }
             Frame::Store { suffix, node, within } => {
-                shop.diagram.cache.put(&shop.diagram.store.memory, self.ops().0, suffix, node, within, result)?;
+                shop.diagram.cache.put(&shop.diagram.store.memory, self.by.ops().0, suffix, node, within, result)?;
                 self.frames.pop();
             }
             Frame::Close { from, to, within } => {

@@ -10,6 +10,7 @@ use super::events::{Suffix, Table};
 use super::image::{All, image};
 pub use super::ordered::Events;
 use super::ordered::Ordered;
+pub use super::saturation::By;
 use super::saturation::{Saturation, Workshop};
 use super::walk::LAYERS_WORK;
 use super::zdd::{EMPTY, Node};
@@ -228,20 +229,22 @@ impl Symbolic {
     }
 
     /// The closure of a set under the firings, or backwards under their reverses, within a set (`ANY`: all markings).
+    ///
+    /// The chosen transitions are those of the last `backward` with some.
     pub fn closure(
         &mut self,
         roots: &[Node],
         set: Node,
         within: Node,
-        back: bool,
+        by: By,
         watch: &mut Watch<'_>,
     ) -> Result<Node, Stop> {
         let held = [set, if within == ANY { EMPTY } else { within }];
         self.again(roots, &held, |space, roots| {
-            space.ordered.agenda(back, &space.transitions)?;
+            space.ordered.agenda(by, &space.transitions)?;
             let Ordered { diagram, blocks, parts, agendas, .. } = &mut space.ordered;
-            let Some(agenda) = &agendas[usize::from(back)] else { return Ok(EMPTY) };
-            let mut search = Saturation::new(diagram, blocks, set, within, back)?;
+            let Some(agenda) = &agendas[by as usize] else { return Ok(EMPTY) };
+            let mut search = Saturation::new(diagram, blocks, set, within, by)?;
             let mut shop = Workshop { diagram, blocks, parts, agenda, roots };
             let result = search.run(&mut shop, u64::MAX, watch);
             search.finish(diagram);
@@ -249,25 +252,33 @@ impl Symbolic {
         })
     }
 
-    /// The markings from which a target can be reached, every marking before it in `within`.
+    /// The markings from which a target can be reached, every marking before it in `within`, by some transitions or all.
     pub fn backward(
         &mut self,
         roots: &[Node],
         targets: Node,
         within: Node,
+        by: Option<&[usize]>,
         watch: &mut Watch<'_>,
     ) -> Result<Node, Stop> {
+        if let Some(by) = by {
+            self.again(roots, &[targets, within], |space, _| space.ordered.choose(&space.transitions, by))?;
+        }
         let inside = self.binary(roots, Binary::Intersection, targets, within, watch)?;
         let mut seeds = inside;
         if inside != targets {
             // Targets outside are not gone through; their predecessors inside are where the search begins.
             let held = [roots, &[inside, targets, within]].concat();
-            let before = self.before(&held, targets, watch)?;
+            let before = match by {
+                None => self.before(&held, targets, watch)?,
+                Some(by) => self.before_by(&held, targets, by, watch)?,
+            };
             let before = self.binary(&held, Binary::Intersection, before, within, watch)?;
             seeds = self.binary(&held, Binary::Union, before, inside, watch)?;
         }
         let held = [roots, &[targets, within, seeds]].concat();
-        let reached = self.closure(&held, seeds, within, true, watch)?;
+        let firings = if by.is_some() { By::Chosen } else { By::Backward };
+        let reached = self.closure(&held, seeds, within, firings, watch)?;
         self.binary(&held, Binary::Union, reached, targets, watch)
     }
 

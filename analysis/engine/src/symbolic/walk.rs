@@ -22,7 +22,7 @@ use std::collections::{BinaryHeap, HashMap, HashSet};
 use super::algebra::Binary;
 use super::cache::ANY;
 use super::events::{Kind, Sense, literals};
-use super::space::{Events, Symbolic};
+use super::space::{By, Events, Symbolic};
 use super::zdd::{EMPTY, Node, Store, TERMINAL};
 use crate::budget::{Stop, Watch};
 use crate::marking::words_for;
@@ -268,7 +268,7 @@ impl Symbolic {
         let held = [roots, &[targets]].concat();
         let aimed = self.single(&held, &places)?;
         let held = [held, vec![aimed]].concat();
-        let leading = self.closure(&held, aimed, self.reach, true, watch)?;
+        let leading = self.closure(&held, aimed, self.reach, By::Backward, watch)?;
         debug_assert!(leading != EMPTY && self.reach != ANY);
         let mut firings = Vec::new();
         loop {
