@@ -37,6 +37,7 @@ from firable.executor.protocol.messages import Effect, Keep, ProtocolError, Send
 from firable.nets.net import Net, Place
 
 PREFIX: Final = "command/"
+_SIGNALS: Final = f"{PREFIX}signal/"
 
 
 class Answer(StrEnum):
@@ -159,10 +160,14 @@ class Commands:
         return False
 
     def resume(self, marked: frozenset[str]) -> Iterator[Effect]:
-        """Send what is owed; a command whose token has left its place meanwhile is void."""
+        """Send what is owed; a command whose token has left its place meanwhile is void.
+
+        Of those that share a completion the earlier are sent first, as they were entered: after a crash between them
+        the completion of the newest would else be taken for that of one which was never sent.
+        """
         if self.questions:
             raise ProtocolError(f"resumed without knowing what became of {self.questions}")
-        for key, command in self.newest.items():
+        for key, command in sorted(self.newest.items(), key=_by_order):
             if _is_owed(command) and command.place not in marked:
                 yield from self._over(key)
             elif command.stage is Stage.OWED:
@@ -187,12 +192,18 @@ class Commands:
 
 @cache
 def _signal_key(completion: str) -> str:
-    return f"{PREFIX}signal/{completion}"
+    return f"{_SIGNALS}{completion}"
 
 
 @cache
 def _place_key(place: str) -> str:
     return f"{PREFIX}place/{place}"
+
+
+def _by_order(kept: tuple[str, Command]) -> tuple[bool, int]:
+    """Earlier commands, which stand under their places, before the newest of their completion."""
+    key, command = kept
+    return key.startswith(_SIGNALS), command.entry
 
 
 def _is_owed(command: Command) -> bool:

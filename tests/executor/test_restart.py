@@ -8,7 +8,7 @@ from support.reference import load_net
 from support.rehearsals import forgetting
 
 from firable.decompose.splitting.cut import split
-from firable.executor.protocol.commands import Answer
+from firable.executor.protocol.commands import Answer, Commands
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
 from firable.executor.protocol.messages import (
@@ -215,7 +215,8 @@ def test_turns_of_an_arbiter_outlive_a_restart() -> None:
     assert fired == ["A", "A-back", "B", "B-back", "A", "A-back"]
 
 
-def test_both_of_two_commands_that_share_a_completion_are_asked_after_and_over_together() -> None:
+def fill_and_heat() -> Decomposition:
+    """A machine that is given two commands at once, of which one signal says that they are done."""
     fill, shared = Command("FILL", "RUN"), Command("HEAT", "RUN")
     net = Net(
         "both",
@@ -228,16 +229,46 @@ def test_both_of_two_commands_that_share_a_completion_are_asked_after_and_over_t
         (Signal("a.done", "a", SignalKind.COMPLETION),),
         (Controller("a"),),
     )
-    decomposition = split(net)
+    return split(net)
+
+
+def test_both_of_two_commands_that_share_a_completion_are_asked_after_and_over_together() -> None:
+    decomposition = fill_and_heat()
     controller = LocalController(decomposition, "a")
     kept = [*controller.start(), *controller.fire()]
     again = restarted(controller, decomposition, kept)
     assert again.commands.questions == (("a.heat", 2), ("a.fill", 1))
     for place, entry in again.commands.questions:
         again.answer(place, entry, Answer.NOT_RECEIVED)
-    assert {(e.place, e.entry) for e in again.resume() if isinstance(e, Sending)} == {("a.fill", 1), ("a.heat", 2)}
+    assert again.resume() == [Sending("a.fill", 1, again=True), Sending("a.heat", 2, again=True)]
     kept += again.read("a.done", value=True, entry=2)
     assert not restarted(again, decomposition, kept).commands.questions
+
+
+def test_commands_that_share_a_completion_and_are_owed_are_sent_in_their_order() -> None:
+    (subnet,) = fill_and_heat().subnets
+    commands = Commands(subnet, {})
+    entered = ("a.fill", "a.heat")
+    for place in entered:
+        commands.enter(subnet.place(place), held=True)
+    resumed = commands.resume(frozenset(entered))
+    assert [e for e in resumed if isinstance(e, Sending)] == [Sending("a.fill", 1), Sending("a.heat", 2)]
+
+
+def test_a_crash_between_two_commands_that_share_a_completion_leaves_the_later_one_to_be_sent() -> None:
+    """Were the later one sent first, its completion would be that of both, and the earlier one never sent."""
+    decomposition = fill_and_heat()
+    controller = LocalController(decomposition, "a")
+    kept = [*controller.start(), *controller.fire()]
+    controller = restarted(controller, decomposition, kept)
+    for place, entry in controller.commands.questions:
+        controller.answer(place, entry, Answer.NOT_RECEIVED)
+    first, second = (effect for effect in controller.resume() if isinstance(effect, Sending))
+    again = restarted(controller, decomposition, kept)
+    kept += again.answer(first.place, first.entry, Answer.DONE)
+    again.answer(second.place, second.entry, Answer.NOT_RECEIVED)
+    assert again.resume() == [Sending("a.heat", 2, again=True)]
+    assert Taken("a.done", value=True) not in kept
 
 
 def test_a_token_waits_on_its_place_until_a_driver_has_the_command_that_has_no_completion() -> None:
