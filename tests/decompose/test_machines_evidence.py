@@ -7,6 +7,7 @@ from hashlib import sha256
 import pytest
 from support.bench_cell import PLANT as BENCH
 from support.bundle_mutants import evidence_mutants, verdict_mutants
+from support.examples import some
 
 from firable.analysis.check import check
 from firable.analysis.evidence.document import Document, Record, document_from_text
@@ -129,6 +130,7 @@ def test_a_bundle_with_its_machines_is_shown() -> None:
     assert all("closed anew with plant.yaml" in checked[name].method for name in names)
 
 
+@pytest.mark.seeds
 @pytest.mark.usefixtures("remembering", "unchanged")
 def test_every_single_change_of_a_verdict_on_the_machines_is_refused() -> None:
     bundle = bundled()
@@ -137,7 +139,7 @@ def test_every_single_change_of_a_verdict_on_the_machines_is_refused() -> None:
         (how, make) for how, make in verdict_mutants(bundle) if how.removeprefix("verdict ").startswith(PREFIXES)
     ]
     assert len(mutants) > 300
-    for how, make in mutants:
+    for how, make in some(mutants, 4):
         try:
             mutant = make()
         except (InputError, ValueError):

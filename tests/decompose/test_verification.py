@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from support.bundle_mutants import decomposition_mutants, evidence_mutants, line_mutants, verdict_mutants
+from support.examples import some
 from support.remembered import answered
 
 from firable.analysis.check import check
@@ -141,13 +142,16 @@ def test_another_theorem_on_the_protocol_is_refused() -> None:
 # Mutants: everything sealed anew, so that all hashes are right
 
 
+@pytest.mark.seeds
 @pytest.mark.usefixtures("remembering")
 @pytest.mark.parametrize("name", ["workshop-1", "one_robot"])
 def test_every_single_change_of_net_subnets_and_table_is_refused(name: str) -> None:
     """Most by cutting the net anew; what the cut does not depend on (names, orders, properties) by the evidence."""
     bundle = bundled(name)
+    mutants = list(decomposition_mutants(bundle))
+    assert len(mutants) > 2000
     count = 0
-    for how, make in decomposition_mutants(bundle):
+    for how, make in some(mutants, 4):
         try:
             mutant = make()
         except (InputError, ValueError):
@@ -159,7 +163,7 @@ def test_every_single_change_of_net_subnets_and_table_is_refused(name: str) -> N
             continue
         assert how.startswith("net: ")
         assert not survives(make, bundle), how
-    assert count > 2000
+    assert count > 500
 
 
 @pytest.mark.usefixtures("remembering")
@@ -211,6 +215,7 @@ def family_of(bundle: Bundle, how: str) -> str:
     return verdicts[0].evidence[0].removesuffix(".smt2") if verdicts else ""
 
 
+@pytest.mark.seeds
 @pytest.mark.usefixtures("remembering")
 def test_every_single_change_of_a_verdict_on_the_net_or_on_a_vote_is_refused(
     monkeypatch: pytest.MonkeyPatch,
@@ -227,7 +232,7 @@ def test_every_single_change_of_a_verdict_on_the_net_or_on_a_vote_is_refused(
     assert survives(lambda: bundle, bundle)
     mutants = [(how, make) for how, make in verdict_mutants(bundle) if not family_of(bundle, how)]
     assert len(mutants) > 250
-    assert [how for how, make in mutants if survives(make, bundle)] == []
+    assert [how for how, make in some(mutants, 3) if survives(make, bundle)] == []
 
 
 @pytest.mark.usefixtures("remembering")

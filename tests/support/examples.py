@@ -1,13 +1,19 @@
-"""How many examples a property is tried on: few in every test run, many in a campaign (`make campaign`).
+"""How many examples a property is tried on: few in every test run, many or all in a campaign (`make campaign`).
 
 A campaign is the same properties on more and on other nets, so there is no second harness whose sentences could differ
 from those of the tests. What fails is shrunk by Hypothesis and printed with the line that reproduces it; what is drawn
-by seeds names its seed.
+by seeds names its seed. What could be gone through to its end, such as all single changes of a bundle, each of which
+is checked as a whole, is drawn from in a test run (`some`), and gone through in a campaign.
 """
 
 import os
+import random
+from collections.abc import Iterable
+from typing import TypeVar
 
 from hypothesis import settings
+
+T = TypeVar("T")
 
 FACTOR = int(os.environ.get("FIRABLE_CAMPAIGN", "1"))
 """How many times more examples are tried than in a test run."""
@@ -24,3 +30,12 @@ def seeds(count: int, part: int = 0) -> range:
     """So many seeds in a test run, `FACTOR` times as many in a campaign; the first part from `FIRST_SEED` on."""
     first = FIRST_SEED + part * count * FACTOR
     return range(first, first + count * FACTOR)
+
+
+def some(everything: Iterable[T], one_in: int) -> list[T]:
+    """One in so many of a list, drawn, in the order of the list; all in a campaign."""
+    listed = list(everything)
+    if FACTOR > 1:
+        return listed
+    drawn = random.Random(FIRST_SEED).sample(range(len(listed)), -(-len(listed) // one_in))
+    return [listed[i] for i in sorted(drawn)]
