@@ -302,7 +302,7 @@ mod tests {
     #[test]
     fn bottom_components_without_edges_are_those_of_pearce() {
         let (mut reversible, mut one, mut several, mut large) = (0, 0, 0, 0);
-        for space in random_spaces(3000, false) {
+        for space in random_spaces(1000, false) {
             let mut poll = unwatched;
             let mut watch = Watch::new(None, &mut poll);
             let found = Bottoms::new(&space, &mut watch).expect("fits");

@@ -49,6 +49,11 @@ pub(crate) fn random_spaces(count: u64, step: bool) -> impl Iterator<Item = Spac
     random_nets(count).map(move |net| explore(net, step))
 }
 
+/// How many times as many nets are drawn in a campaign (`make campaign`), else 1.
+fn factor() -> u64 {
+    std::env::var("FIRABLE_CAMPAIGN").ok().and_then(|text| text.parse().ok()).unwrap_or(1)
+}
+
 /// Small random nets: tokens that move, merge and split under gates.
 pub(crate) fn random_nets(count: u64) -> impl Iterator<Item = Net> {
     let mut seed = 5_u64;
@@ -56,7 +61,7 @@ pub(crate) fn random_nets(count: u64) -> impl Iterator<Item = Net> {
         seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
         (crate::marking::mix(seed) % n) as u32
     };
-    (0..count).map(move |round| {
+    (0..count * factor()).map(move |round| {
         // Some nets are wider than a word.
         let (places, spread) = (4 + below(9), [1, 1, 7, 40][round as usize % 4]);
         let mut transitions: Vec<Transition> = (0..places + below(6))
