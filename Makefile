@@ -11,6 +11,8 @@ CARGO_OPTIONS := --locked --manifest-path $(CRATE)/Cargo.toml
 # Some tests wait for links, devices and browsers, so two workers more than there are processors. Files go in their order:
 # those with few tests, which have the longest, would else come last, and one worker would end alone.
 PYTEST_OPTIONS ?= -q -n $(shell echo $$(($$(nproc 2>/dev/null || echo 1) + 2))) --dist loadfile --no-loadscope-reorder
+# A command to run beside the build of the crate, before the tests; `.ci/run` installs what some of them need.
+MEANWHILE ?=
 # A campaign: how many times the examples of a test run, from which seed, and in which folder of tests.
 FACTOR ?= 40
 SEED := $(shell date +%s)
@@ -27,12 +29,15 @@ ifneq ($(wildcard ../shared/nets),)
 export FIRABLE_NETS ?= $(abspath ../shared/nets)
 endif
 
+# Tests start hundreds of processes: without the cache of Python, which some environments turn off, each compiles its modules.
+unexport PYTHONDONTWRITEBYTECODE
+
 # The crate is built for the Python that the environment was made with.
 export PYO3_PYTHON = $(abspath $(BIN)/python)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test fmt docs page bench bench-instructions campaign simulate explore mutants clean lint lint-python lint-ruff
+.PHONY: help demo test meanwhile fmt docs page bench bench-instructions campaign simulate explore mutants clean lint lint-python lint-ruff
 .PHONY: lint-format lint-types lint-rust lint-rust-format lint-clippy test-rust test-python
 
 help: ## these lines
@@ -45,8 +50,12 @@ demo: $(MADE)/install ## check, prove, bundle and run the one-robot cell, and se
 # crate is checked and tested while the environment is made, of which the longest is the same crate, optimised as shipped.
 # What make says to its own children (MAKEFLAGS) is kept from cargo, which takes it for an order to wait for make.
 test: $(MADE)/rust-tools ## lint, format, types, and all tests
-	$(MAKE) --jobs=2 --output-sync=target $(MADE)/develop lint-rust test-rust lint-python
+	$(MAKE) --jobs=$(if $(MEANWHILE),3,2) --output-sync=target \
+		$(if $(MEANWHILE),meanwhile) $(MADE)/develop lint-rust test-rust lint-python
 	$(MAKE) test-python
+
+meanwhile:
+	$(MEANWHILE)
 
 lint: lint-python lint-rust ## what `make test` checks before it tests
 
@@ -91,6 +100,7 @@ bench: $(MADE)/develop ## measure, as ratios to yardsticks in the same run; writ
 	$(BIN)/python benchmarks/run.py
 
 campaign: $(MADE)/develop ## every property of the tests on FACTOR times as many drawn nets; SEED brings a campaign back
+	$(if $(filter tests tests/engine,$(CAMPAIGN)),MAKEFLAGS= FIRABLE_CAMPAIGN=$(FACTOR) cargo test $(CARGO_OPTIONS) --release --quiet)
 	FIRABLE_CAMPAIGN=$(FACTOR) FIRABLE_SEED=$(SEED) $(BIN)/pytest $(PYTEST_OPTIONS) --dist load \
 		-m "hypothesis or seeds" --hypothesis-seed=$(SEED) $(CAMPAIGN)
 
