@@ -98,13 +98,13 @@ class Commands:
 
     @property
     def questions(self) -> tuple[tuple[str, int], ...]:
-        """The place and entry of each command of which nobody could tell yet whether it was received."""
-        return tuple((c.place, c.entry) for c in self.newest.values() if c.answer is Answer.UNKNOWN)
+        """The place and entry of each command that nobody could tell yet to be received or not, in their order."""
+        return tuple((c.place, c.entry) for _, c in self._in_order() if c.answer is Answer.UNKNOWN)
 
     @property
     def owed(self) -> tuple[tuple[str, int], ...]:
-        """The place and entry of each command that will be sent when the controller is resumed."""
-        return tuple((c.place, c.entry) for c in self.newest.values() if _is_owed(c))
+        """The place and entry of each command that will be sent when the controller is resumed, in their order."""
+        return tuple((c.place, c.entry) for _, c in self._in_order() if _is_owed(c))
 
     @property
     def unsent(self) -> tuple[str, ...]:
@@ -162,12 +162,12 @@ class Commands:
     def resume(self, marked: frozenset[str]) -> Iterator[Effect]:
         """Send what is owed; a command whose token has left its place meanwhile is void.
 
-        Of those that share a completion the earlier are sent first, as they were entered: after a crash between them
-        the completion of the newest would else be taken for that of one which was never sent.
+        After a crash between two that share a completion, and out of order, the completion of the newest would be taken
+        for that of one which was never sent.
         """
         if self.questions:
             raise ProtocolError(f"resumed without knowing what became of {self.questions}")
-        for key, command in sorted(self.newest.items(), key=_by_order):
+        for key, command in self._in_order():
             if _is_owed(command) and command.place not in marked:
                 yield from self._over(key)
             elif command.stage is Stage.OWED:
@@ -177,6 +177,10 @@ class Commands:
             elif _is_owed(command):
                 command.answer = None
                 yield Sending(command.place, command.entry, again=True)
+
+    def _in_order(self) -> list[tuple[str, Command]]:
+        """All that are kept, by their keys; the earlier ones of a completion, under their places, before its newest."""
+        return sorted(self.newest.items(), key=lambda kept: (kept[0].startswith(_SIGNALS), kept[1].entry))
 
     def _over(self, key: str) -> list[Effect]:
         command = self.newest.get(key)
@@ -198,12 +202,6 @@ def _signal_key(completion: str) -> str:
 @cache
 def _place_key(place: str) -> str:
     return f"{PREFIX}place/{place}"
-
-
-def _by_order(kept: tuple[str, Command]) -> tuple[bool, int]:
-    """Earlier commands, which stand under their places, before the newest of their completion."""
-    key, command = kept
-    return key.startswith(_SIGNALS), command.entry
 
 
 def _is_owed(command: Command) -> bool:

@@ -237,7 +237,7 @@ def test_both_of_two_commands_that_share_a_completion_are_asked_after_and_over_t
     controller = LocalController(decomposition, "a")
     kept = [*controller.start(), *controller.fire()]
     again = restarted(controller, decomposition, kept)
-    assert again.commands.questions == (("a.heat", 2), ("a.fill", 1))
+    assert again.commands.questions == (("a.fill", 1), ("a.heat", 2))
     for place, entry in again.commands.questions:
         again.answer(place, entry, Answer.NOT_RECEIVED)
     assert again.resume() == [Sending("a.fill", 1, again=True), Sending("a.heat", 2, again=True)]
