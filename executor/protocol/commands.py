@@ -4,7 +4,8 @@ A command is issued once for each entry of a token, and numbered: `entry` counts
 signal, or those of a place whose command has none. Of each such count only the newest command matters, since a
 completion of an earlier one is stale. So one record a count is kept, under `command/...`: the place, the entry, and how
 far it has come. Where two places share a completion and are entered together, the earlier command has a record of its
-own, until the completion comes that is that of both. A command is
+own, until the completion comes that is that of both. They are sent, and asked after, in their order, so that a device
+which takes one after the other has done the earlier before the later. A command is
 
 - *issued*: it was handed on to be sent. It may have been sent, or not, or half: who crashed cannot know;
 - *owed*: its token entered while the controller was held after a restart, and it was not handed on yet;
@@ -37,7 +38,6 @@ from firable.executor.protocol.messages import Effect, Keep, ProtocolError, Send
 from firable.nets.net import Net, Place
 
 PREFIX: Final = "command/"
-_SIGNALS: Final = f"{PREFIX}signal/"
 
 
 class Answer(StrEnum):
@@ -179,8 +179,14 @@ class Commands:
                 yield Sending(command.place, command.entry, again=True)
 
     def _in_order(self) -> list[tuple[str, Command]]:
-        """All that are kept, by their keys; the earlier ones of a completion, under their places, before its newest."""
-        return sorted(self.newest.items(), key=lambda kept: (kept[0].startswith(_SIGNALS), kept[1].entry))
+        """All that are kept, by their keys; those that share a completion by their entries, where the first stands."""
+        first: dict[str, int] = {}
+        for command in self.newest.values():
+            first.setdefault(self._count_of(command), len(first))
+        return sorted(self.newest.items(), key=lambda kept: (first[self._count_of(kept[1])], kept[1].entry))
+
+    def _count_of(self, command: Command) -> str:
+        return self.subnet.place(command.place).completion or command.place
 
     def _over(self, key: str) -> list[Effect]:
         command = self.newest.get(key)
@@ -196,7 +202,7 @@ class Commands:
 
 @cache
 def _signal_key(completion: str) -> str:
-    return f"{_SIGNALS}{completion}"
+    return f"{PREFIX}signal/{completion}"
 
 
 @cache

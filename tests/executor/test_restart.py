@@ -255,6 +255,19 @@ def test_commands_that_share_a_completion_and_are_owed_are_sent_in_their_order()
     assert [e for e in resumed if isinstance(e, Sending)] == [Sending("a.fill", 1), Sending("a.heat", 2)]
 
 
+def test_the_order_of_commands_is_that_of_their_entries_within_a_completion_and_else_that_of_their_first() -> None:
+    places = [Place(f"a.{name}", "a", command=Command(name, "M"), completion="a.done") for name in "xyz"]
+    lamp = Place("a.lamp", "a", command=Command("LIGHT", "L"))
+    signals = (Signal("a.done", "a", SignalKind.COMPLETION),)
+    commands = Commands(Net("three", (*places, lamp), (), signals, (Controller("a"),)), {})
+    x, y, z = places
+    for place in (lamp, z, lamp, x, y):
+        commands.enter(place, held=True)
+    assert commands.owed == (("a.lamp", 2), ("a.z", 1), ("a.x", 2), ("a.y", 3))
+    commands.enter(z, held=True)
+    assert commands.owed == (("a.lamp", 2), ("a.x", 2), ("a.y", 3), ("a.z", 4))
+
+
 def test_a_crash_between_two_commands_that_share_a_completion_leaves_the_later_one_to_be_sent() -> None:
     """Were the later one sent first, its completion would be that of both, and the earlier one never sent."""
     decomposition = fill_and_heat()
