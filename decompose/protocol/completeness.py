@@ -69,8 +69,8 @@ def carrying(space: StateSpace[Any], net: Net, marking: Marking) -> Any:
 def first_lost(protocol: ProtocolNet, space: StateSpace[Any], limits: Limits) -> Lost | None:
     """What is lost, if anything.
 
-    Raises `IncompleteGraph` where the space, or that of the central net, is not whole, and `BudgetExceeded` where time
-    or memory ends.
+    Raises `IncompleteGraph` where the space, or that of the central net, is not whole, `BudgetExceeded` where time or
+    memory ends, and `ValueError` of a protocol in which a hidden step changes the central marking.
     """
     space.require_complete()
     markings = central_markings(protocol.parts.net, limits)
@@ -85,6 +85,8 @@ class _Completeness:
     def __init__(self, protocol: ProtocolNet, space: StateSpace[Any]) -> None:
         self.protocol, self.space = protocol, space
         self.net, self.central = protocol.net, protocol.parts.net
+        if moving := _moving(protocol):
+            raise ValueError(f"hidden steps change the central marking: {', '.join(moving)}")
         self.quiet = space.satisfying(protocol.quiet)
         outside = [Holds(ASTRAY), *([Holds(GO_ON)] if GO_ON in self.net.place_index else [])]
         self.asked = space.algebra.negation(space.satisfying(Or(tuple(outside))))
@@ -100,11 +102,15 @@ class _Completeness:
 
     def lost_in(self, marking: Marking, may_fire: tuple[int, ...]) -> Iterator[Lost]:
         """What is lost in the configurations of one central marking."""
+        if not may_fire:
+            return
         algebra = self.space.algebra
         starts = all(map(self._starts_from_home(marking), may_fire))
         if starts and not self.space.count(self.astray):
             return
         inside = algebra.conjunction([carrying(self.space, self.central, marking), self.asked])
+        if not self.space.count(inside):
+            return
         if starts and not self.space.count(algebra.conjunction([inside, self.astray])):
             return
         for t in may_fire:
@@ -165,6 +171,13 @@ def way(protocol: ProtocolNet, t: str, *, voted: bool = False) -> tuple[str, ...
         elif not voted:
             steps += [f"stand/{at_it}", f"stand/{at_it}/again", f"hear/{at_it}"]
     return (*steps, f"decide/{t}")
+
+
+def _moving(protocol: ProtocolNet) -> list[str]:
+    """The hidden steps that change the central marking; of no protocol that is built there are any."""
+    carried = {central(place.name) for place in protocol.parts.net.places}
+    hidden = [protocol.net.transitions[i] for i in protocol.hidden]
+    return [t.name for t in hidden if not carried.isdisjoint((*t.inputs, *t.outputs))]
 
 
 def _is_firable(part: Part, marking: frozenset[str]) -> bool:

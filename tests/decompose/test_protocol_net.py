@@ -22,6 +22,7 @@ from firable.analysis.spaces.space import StateSpace
 from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.decompose.protocol import exploring
 from firable.decompose.protocol.building import ProtocolNet, protocol_net
+from firable.decompose.protocol.completeness import first_lost
 from firable.decompose.protocol.divergence import not_falling, weights
 from firable.decompose.protocol.exploring import Exploration, explore_protocol
 from firable.decompose.protocol.variant import ANY_FAULTS, NO_FAULTS, ONE_OF_EACH, PROTOCOL, Faults, Often, Variant
@@ -135,6 +136,17 @@ def test_what_only_a_firing_leads_back_to_is_lost(held: str) -> None:
     assert lost.witness.firings == (("ask/G",),)
     asked = protocol.net.marking(lost.witness.marking)
     assert space.contains(space.backward(space.satisfying(protocol.quiet)), asked)
+
+
+def test_a_protocol_whose_hidden_steps_change_the_central_marking_is_not_judged() -> None:
+    """All configurations are asked at once whether hidden steps lead home, which says nothing of such a protocol."""
+    whole = protocol_net(split(load_net("ring")))
+    moved = [
+        replace(t, inputs=(*t.inputs, "central/c1.p")) if t.name == "give-up/G" else t for t in whole.net.transitions
+    ]
+    protocol = replace(whole, net=replace(whole.net, transitions=tuple(moved)))
+    with pytest.raises(ValueError, match="hidden steps change the central marking: give-up/G"):
+        first_lost(protocol, explore(protocol.net), Limits())
 
 
 def test_whole_cell_is_explored_as_a_diagram_and_refines() -> None:
