@@ -180,7 +180,7 @@ class SymbolicSpace(Derived[MarkingSet]):
     ) -> MarkingSet:
         """The markings from which a target can be reached (EF), going only through `within` (E[within U targets]).
 
-        With `by`, by edges that fire one of these transitions.
+        With `by`, by firings of these transitions alone.
         """
         return self.engine.backward(targets, within, None if by is None else sorted(set(by)))
 

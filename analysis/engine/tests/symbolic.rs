@@ -157,10 +157,15 @@ fn some_of(numbers: &mut Numbers, all: &Set) -> Set {
     all.iter().copied().filter(|_| numbers.below(every) == 0).collect()
 }
 
+/// How many times as many nets are drawn in a campaign (`make campaign`), else 1.
+fn factor() -> u64 {
+    std::env::var("FIRABLE_CAMPAIGN").ok().and_then(|text| text.parse().ok()).unwrap_or(1)
+}
+
 #[test]
 fn every_operation_agrees_with_sets_of_masks() {
     let mut numbers = Numbers(0x1234_5678_9abc_def1);
-    for _ in 0..1000 {
+    for _ in 0..1000 * factor() {
         let mut both = Both::drawn(&mut numbers);
         let start: Set = [mask(&both.naive.initial)].into();
         let reach = both.naive.closure(&start, |_| true);

@@ -77,11 +77,16 @@ impl Ordered {
         Ok(ordered)
     }
 
-    /// Makes the agenda of what a closure goes by; that of chosen transitions is made by `choose`.
+    /// Makes the agenda of what a closure goes by; the transitions that were chosen are those of `choose`.
     pub(super) fn agenda(&mut self, by: By, transitions: &[Transition]) -> Result<(), Stop> {
         if self.agendas[by as usize].is_none() {
             let sense = if by == By::Forward { Sense::Forward } else { Sense::Backward };
-            let firings = Literals::new(transitions, &self.level_of, sense);
+            let chosen: Vec<Transition> = match by {
+                By::Chosen => self.chosen.iter().map(|&t| transitions[t].clone()).collect(),
+                By::Forward | By::Backward => Vec::new(),
+            };
+            let its = if by == By::Chosen { &chosen } else { transitions };
+            let firings = Literals::new(its, &self.level_of, sense);
             self.agendas[by as usize] = Some(Agenda::new(&mut self.parts, &firings, &self.blocks)?);
             self.claim()?;
         }
@@ -89,6 +94,8 @@ impl Ordered {
     }
 
     /// Makes the agenda of the firings of some transitions, backwards, and forgets what was found by others.
+    ///
+    /// Other transitions than last time cost their parts anew, for as long as the diagram lives.
     pub(super) fn choose(&mut self, transitions: &[Transition], some: &[usize]) -> Result<(), Stop> {
         if self.chosen != some {
             let (fire, fix) = By::Chosen.ops();
@@ -96,8 +103,7 @@ impl Ordered {
             self.agendas[By::Chosen as usize] = None;
             self.chosen = some.to_vec();
         }
-        let its: Vec<Transition> = some.iter().map(|&t| transitions[t].clone()).collect();
-        self.agenda(By::Chosen, &its)
+        self.agenda(By::Chosen, transitions)
     }
 
     /// Claims the bytes of what was made of the transitions.
