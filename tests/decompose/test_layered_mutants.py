@@ -142,8 +142,8 @@ def test_every_single_change_of_a_verdict_on_who_is_dead_in_layers_is_refused(
 ) -> None:
     bundle = bundled()
     cut = check_cut(bundle.decomposition)
-    mutants = some([(how, make) for how, make in verdict_mutants(bundle) if how.startswith(f"verdict {PREFIX}")], 9)
-    assert len(mutants) > 10
+    mutants = some([(how, make) for how, make in verdict_mutants(bundle) if how.startswith(f"verdict {PREFIX}")], 3)
+    assert len(mutants) > 30
     for how, make in mutants:
         try:
             mutant = Examination(make())

@@ -142,16 +142,13 @@ def test_another_theorem_on_the_protocol_is_refused() -> None:
 # Mutants: everything sealed anew, so that all hashes are right
 
 
-@pytest.mark.seeds
 @pytest.mark.usefixtures("remembering")
 @pytest.mark.parametrize("name", ["workshop-1", "one_robot"])
 def test_every_single_change_of_net_subnets_and_table_is_refused(name: str) -> None:
     """Most by cutting the net anew; what the cut does not depend on (names, orders, properties) by the evidence."""
     bundle = bundled(name)
-    mutants = list(decomposition_mutants(bundle))
-    assert len(mutants) > 2000
     count = 0
-    for how, make in some(mutants, 4):
+    for how, make in decomposition_mutants(bundle):
         try:
             mutant = make()
         except (InputError, ValueError):
@@ -163,7 +160,7 @@ def test_every_single_change_of_net_subnets_and_table_is_refused(name: str) -> N
             continue
         assert how.startswith("net: ")
         assert not survives(make, bundle), how
-    assert count > 500
+    assert count > 2000
 
 
 @pytest.mark.usefixtures("remembering")
