@@ -1,6 +1,6 @@
-"""What the dead keep back is what exploring the protocol finds, and for controllers more, as a round may stay open.
+"""What the dead keep back is shown by evidence, and nothing else passes for it.
 
-Evidence shows it, and nothing else passes for it.
+That it is right is tested in `test_outages_as_explored.py`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -11,10 +11,11 @@ from typing import Any
 import pytest
 from support.bundle_mutants import evidence_mutants, line_mutants, verdict_mutants
 from support.examples import some
-from support.explored_outages import explored_outages
-from support.free_parts import freed
+from support.explored_outages import is_as_explored
+from support.free_parts import freed, with_free_parts
 from support.layered_nets import cells_in_a_line
 from support.looping_nets import looping_net
+from support.outage_nets import gated, overtaken
 from support.owned_nets import owned_net
 
 from firable.analysis.evidence.checking.checker import CheckedRecord, check_document
@@ -48,41 +49,6 @@ from firable.nets.net import Controller, Net, Place, Transition
 from firable.nets.verdict import Status, Verdict, Weight
 
 TIMEOUT_MS = 10_000
-
-
-def gated(a: str = "a", together: str = "G") -> Net:
-    """`a` goes round by itself, and what it does together with `b` reads the loop: a promise of that keeps it still."""
-    marked = {f"{a}.up": True, f"{a}.down": False, f"{a}.p": True, f"{a}.q": False, "b.r": True, "b.s": False}
-    places = tuple(Place(name, name.partition(".")[0], marked=token) for name, token in marked.items())
-    transitions = (
-        Transition("turn", (f"{a}.up",), (f"{a}.down",)),
-        Transition("back", (f"{a}.down",), (f"{a}.up",)),
-        Transition(together, (f"{a}.p", "b.r"), (f"{a}.q", "b.s"), permissive=(f"{a}.up",)),
-        Transition("H", (f"{a}.q", "b.s"), (f"{a}.p", "b.r")),
-    )
-    return Net("gated", places, transitions, controllers=(Controller(a), Controller("b")))
-
-
-def overtaken() -> Net:
-    """`u` is decided by the line, and `p` goes on from it by `l`; `r` may be behind, and then `y` never comes.
-
-    Before `l` has fired, `x` goes on without `y`, and where `r` is not behind, by it.
-    """
-    marked = dict.fromkeys(("p.a", "p.q", "p.r", "p.z", "p.k", "p.j", "r.b", "r.d", "r.e", "s.g", "s.h"), False)
-    marked |= dict.fromkeys(("p.a", "p.r", "r.b", "s.g"), True)
-    transitions = (
-        Transition("u", ("p.a", "r.b", "s.g"), ("p.q", "r.d", "s.h")),
-        Transition("back", ("r.e", "s.h"), ("p.a", "r.b", "s.g")),
-        Transition("l", ("p.q", "p.r"), ("p.z",)),
-        Transition("alone", ("p.r",), ("p.k",)),
-        Transition("y", ("p.z", "r.d"), ("p.k", "r.e")),
-        Transition("x", ("p.k",), ("p.j",)),
-        Transition("again", ("p.j",), ("p.r",)),
-    )
-    places = tuple(Place(name, name[0], marked=token) for name, token in marked.items())
-    layers = (Controller("line", coordinator=True), Controller("cell"), Controller("s"))
-    below = (Controller("p", under="cell"), Controller("r", under="cell"))
-    return Net("overtaken", places, transitions, controllers=(*layers, *below))
 
 
 @cache
@@ -134,59 +100,6 @@ def refused(make: Callable[[], Bundle]) -> bool:
     return bool(others or unshown or set(bundle.evidence) - examination.used)
 
 
-# --------------------------------------------------------------------------------------------------------------------
-# What is found is right
-
-
-def is_as_explored(net: Net, decomposed: Callable[[Net], Decomposition] = split) -> bool:
-    """Of coordinators the same is found; of controllers no more goes on, since rounds are given up where explored."""
-    decomposition = decomposed(net)
-    for one, other in zip(outages(decomposition), explored_outages(decomposition), strict=True):
-        if one != other and (
-            not one.who
-            or (one.who, one.at_once) != (other.who, other.at_once)
-            or not set(one.goes_on) <= set(other.goes_on)
-            or not set(one.running) <= set(other.running)
-        ):
-            return False
-    return True
-
-
-@pytest.mark.parametrize("seed", [1, 3, 5, 8])
-def test_what_the_dead_keep_back_is_what_exploring_the_protocol_finds_where_loops_are_read(seed: int) -> None:
-    assert is_as_explored(looping_net(seed))
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_what_the_dead_keep_back_is_what_exploring_the_protocol_finds(seed: int) -> None:
-    assert is_as_explored(owned_net(seed))
-
-
-def with_free_parts(net: Net) -> Decomposition:
-    return freed(split(net))
-
-
-@pytest.mark.parametrize(
-    ("make", "seed"), [*((owned_net, seed) for seed in range(5)), *((looping_net, seed) for seed in (1, 3, 5))]
-)
-def test_what_goes_on_beside_free_parts_goes_on_where_their_protocol_is_explored(
-    make: Callable[[int], Net], seed: int
-) -> None:
-    assert is_as_explored(make(seed), with_free_parts)
-
-
-@pytest.mark.parametrize("make", [cells_in_a_line, gated])
-def test_what_goes_on_beside_free_parts_in_layers_and_behind_gates_is_explored(make: Callable[[], Net]) -> None:
-    assert is_as_explored(make(), with_free_parts)
-    assert is_as_explored(overtaken(), with_free_parts)
-
-
-def test_a_part_whose_order_never_comes_keeps_back_what_needs_its_tokens_after_others_have_gone_on() -> None:
-    assert is_as_explored(overtaken())
-    dead = {outage.name: outage for outage in outages(split(overtaken()))}
-    assert dead["coordinator line"].at_last == ("l", "alone", "y", "x", "again")
-
-
 def gated_by_its_own() -> Net:
     """Gates on what a transition itself moves say nothing that Eq. (1) does not: `t` and `u` are decided together."""
     marked = {"a.p": False, "b.q": False, "b.r": True}
@@ -207,13 +120,6 @@ def test_a_part_that_is_behind_has_moved_what_its_own_gates_read() -> None:
     assert not refused(partial(bundled, gated_by_its_own))
 
 
-def test_a_promise_that_nobody_takes_back_keeps_still_what_it_reads() -> None:
-    dead = {outage.name: outage for outage in outages(split(gated()))}
-    assert dead["the coordinator"].at_once == ("G", "H")
-    assert dead["the coordinator"].at_last == ("turn", "back")
-    assert dead["b"].goes_on == ()  # `b` may have been asked for `G` too, and `a` have promised its part
-
-
 def test_without_the_promises_that_are_left_too_much_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Bereft, "left", ())
     assert {outage.name: outage for outage in outages(split(gated()))}["the coordinator"].goes_on == ("turn", "back")
@@ -225,11 +131,6 @@ def test_without_the_promises_that_are_left_too_much_goes_on(monkeypatch: pytest
     monkeypatch.setattr(DeadProof, "lacks", lambda *_: "")
     verdicts, files = sealed_outages(decomposition)
     assert refused(lambda: Bundle(decomposition, (*run, *verdicts), {**proofs, **files}))
-
-
-@pytest.mark.parametrize("name", ["conceptual_one_robot", "one_robot", "two_robots_separate", "two_cells"])
-def test_of_everybody_in_the_cells_of_the_catalogue_it_is_known(name: str) -> None:
-    assert [outage.name for outage in outages(split(catalogue_net(name))) if outage.bound] == []
 
 
 # --------------------------------------------------------------------------------------------------------------------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -12,12 +12,13 @@ from firable.analysis.spaces.reachability import Budget, explore
 from firable.decompose.protocol.completeness import CENTRAL_MARKINGS_MAX, carrying
 from firable.decompose.protocol.draft import coordinator_down, down
 from firable.decompose.protocol.exploring import Exploration, explore_protocol, space_of
-from firable.decompose.protocol.outages import Outage, commanding
+from firable.decompose.protocol.outages import Outage, commanding, outages
 from firable.decompose.protocol.parts import Parts
 from firable.decompose.protocol.variant import PROTOCOL, Faults, Often
+from firable.decompose.splitting.cut import split
 from firable.nets.decomposition import Decomposition
 from firable.nets.formula import Holds
-from firable.nets.net import Marking
+from firable.nets.net import Marking, Net
 from firable.semantics.player import Player
 
 
@@ -109,3 +110,17 @@ def _kept_back(found: Exploration, stuck: Mapping[tuple[str, ...], Any]) -> set[
         if among:
             look(central.marking(i), among)
     return kept_back
+
+
+def is_as_explored(net: Net, decomposed: Callable[[Net], Decomposition] = split) -> bool:
+    """Of coordinators the same is found; of controllers no more goes on, since rounds are given up where explored."""
+    decomposition = decomposed(net)
+    for one, other in zip(outages(decomposition), explored_outages(decomposition), strict=True):
+        if one != other and (
+            not one.who
+            or (one.who, one.at_once) != (other.who, other.at_once)
+            or not set(one.goes_on) <= set(other.goes_on)
+            or not set(one.running) <= set(other.running)
+        ):
+            return False
+    return True

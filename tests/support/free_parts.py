@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from support.planted import without
 
+from firable.decompose.splitting.cut import split
 from firable.decompose.splitting.persistence import persistence
 from firable.executor.protocol.above import Above
 from firable.executor.protocol.controller import LocalController
@@ -77,6 +78,11 @@ def parts_of(decomposition: Decomposition, *names: str) -> Decomposition:
 def freed(decomposition: Decomposition) -> Decomposition:
     """The decomposition with all parts free of promise that may be."""
     return parts_of(decomposition, *persistence(decomposition).free_of_promise)
+
+
+def with_free_parts(net: Net) -> Decomposition:
+    """The split of a net, with what can be shown to be free of promise free."""
+    return freed(split(net))
 
 
 class CountsEarlierEpochs(Coordinator):
