@@ -5,7 +5,9 @@ signal, or those of a place whose command has none. Of each such count only the 
 completion of an earlier one is stale. So one record a count is kept, under `command/...`: the place, the entry, and how
 far it has come. Where two places share a completion and are entered together, the earlier command has a record of its
 own, until the completion comes that is that of both. They are sent, and asked after, in their order, so that a device
-which takes one after the other has done the earlier before the later. A command is
+which takes one after the other has done the earlier before the later. A net in which both wait at once may not run
+(`shared-completions` must be proved): there the earlier is one whose time was over, whose token has left, and which its
+machine may still be at. The nets that the simulation draws have all of it. A command is
 
 - *issued*: it was handed on to be sent. It may have been sent, or not, or half: who crashed cannot know;
 - *owed*: its token entered while the controller was held after a restart, and it was not handed on yet;
