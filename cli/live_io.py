@@ -80,10 +80,13 @@ def live_io(
 
 def _forced(binding: Binding, text: str) -> tuple[str, bool]:
     """The signal and the value that are asked for, if the binding allows it."""
+    from firable.executor.drivers.binding import shown_as
     from firable.nets.diagnostics import did_you_mean
 
     name, _, value = text.partition("=")
     signals = binding.document.signals
+    if name in {shown for contact in binding.document.emergency_stop for shown in (contact, shown_as(contact))}:
+        raise click.UsageError(f"'{name}' is a contact of the emergency stop, which is opened and closed by hand alone")
     known = [signal for signal, bound in signals.items() if bound is not None]
     if name in signals and name not in known:
         said = "its machine says when it is done, and no sensor that could be forced has a part in it"

@@ -23,6 +23,13 @@ def reason(error: Exception) -> str:
 
 
 def port_reason(error: Exception) -> str:
-    """Why a serial port cannot be had; one that another program has is locked by it."""
-    is_taken = isinstance(error, OSError) and error.errno in {errno.EAGAIN, errno.EBUSY}
-    return "another program has it open" if is_taken else reason(error)
+    """Why a serial port cannot be had; one that another program has is locked by it.
+
+    What the system says of a file that is no port, pyserial hands on in words of its own.
+    """
+    if isinstance(error, OSError) and error.errno in {errno.EAGAIN, errno.EBUSY}:
+        return "another program has it open"
+    said_first = error.__context__
+    if said_first is not None and said_first.args[:1] == (errno.ENOTTY,):
+        return "this is no serial port"
+    return reason(error)

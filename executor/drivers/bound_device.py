@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 from firable.executor.drivers.binding import CommandDocument, SignalDocument, writes
 from firable.executor.drivers.channels import Channel, Order, Outcome, Said
-from firable.executor.drivers.device import Point, Value, Writes, as_bit
+from firable.executor.drivers.device import Point, Value, Wanted, Writes, as_bit
 from firable.executor.drivers.driver import Quality, Reading
 from firable.executor.drivers.emergency import Contacts
 from firable.executor.drivers.handshake import Handshake
@@ -87,8 +87,22 @@ class BoundDevice:
         self.garbage: dict[Point, Value] = {}
         points = {*self.image.reads, *self.image.counters, *self.replies}
         points |= {point for point in (self.tripped, None if alive is None else alive.read) if point is not None}
-        urgent = frozenset(one.read for one in contacts.values())
-        self.kept = Kept(self.document, binding.kinds[name], binding.options[name], frozenset(points), self, urgent)
+        wanted = Wanted(
+            tuple(sorted(points)),
+            self.document.timeout_s,
+            urgent=frozenset(one.read for one in contacts.values()),
+            forced=frozenset(one.read for one in signals.values() if one.force) - set(self._commanding()),
+        )
+        self.kept = Kept(self.document, binding.kinds[name], binding.options[name], wanted, self)
+
+    def _commanding(self) -> Iterator[Point]:
+        """The points that are written to command the device, or to stop it."""
+        yield from self.document.safe
+        yield from (point for some in self.writes.values() for point, _ in some)
+        for channel in self.document.channels.values():
+            yield channel.asks
+        if self.document.heartbeat is not None:
+            yield self.document.heartbeat.write
 
     async def run(self) -> None:
         """Keep the device connected."""
@@ -158,10 +172,11 @@ class BoundDevice:
     def unshown(self) -> str:
         """What it should have shown by now and never has, with the points; empty where there is nothing."""
         unread = [name for name, reading in self.image.readings.items() if not reading.at_seconds]
-        if not self.is_overdue or not unread:
-            return ""
-        where = ", ".join(f"'{name}' (at {self.image.signals[name].read})" for name in sorted(unread))
-        return f"{self.name} has never shown {where}"
+        silent = [f"'{name}' (at {self.image.signals[name].read})" for name in sorted(unread)]
+        for name, channel in self.channels.items():
+            unsaid = {key: point for point, key in channel.points().items() if key not in channel.shown}
+            silent += [f"what '{name}' has {key} (at {point})" for key, point in unsaid.items()]
+        return f"{self.name} has never shown {', '.join(silent)}" if self.is_overdue and silent else ""
 
     @property
     def untaken(self) -> str:

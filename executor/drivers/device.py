@@ -114,12 +114,14 @@ class Use(StrEnum):
 class Wanted:
     """What a connection is for: the points to be read, and how long an answer may take.
 
-    Those that are `urgent`, the contacts of the emergency stop, are told as soon as they are known.
+    Those that are `urgent`, the contacts of the emergency stop, are told as soon as they are known. The `forced` ones
+    are written only when a signal is forced, in the place of the device, which writes them else.
     """
 
     read: Collection[Point]
     timeout_s: float
     urgent: Collection[Point] = ()
+    forced: Collection[Point] = ()
 
 
 class Connection(Protocol):

@@ -133,14 +133,13 @@ class Kept:
         document: DeviceDocument,
         kind: DeviceKind,
         options: Options,
-        points: frozenset[Point],
+        wanted: Wanted,
         served: Served,
-        urgent: frozenset[Point] = frozenset(),
     ) -> None:
         self.document = document
         self.kind = kind
         self.options = options
-        self.wanted = Wanted(tuple(sorted(points)), document.timeout_s, urgent)
+        self.wanted = wanted
         self.served = served
         self.safe = writes(document.safe)
         self.awake = asyncio.Event()

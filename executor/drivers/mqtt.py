@@ -1,9 +1,11 @@
 """MQTT, by aiomqtt: points are topics, values their payloads as text.
 
 What a device shows it publishes *retained*, so that a driver that connects learns at once how things stand; what the
-driver writes is not, because a device that comes back must not find an old command waiting. Everything goes with QoS 1,
-and a write is confirmed by the broker: that the device has a command is shown by the number that it has taken. That the
-device is there at all is not to be seen from a connection to a broker; `alive` in the binding is for that.
+driver writes is not, because a device that comes back must not find an old command waiting; but a signal that is forced
+is published in the place of the device, and as it would: retained, or whoever connects next would learn what stood
+there before. Everything goes with QoS 1, and a write is confirmed by the broker: that the device has a command is shown
+by the number that it has taken. That the device is there at all is not to be seen from a connection to a broker;
+`alive` in the binding is for that.
 
 The first answer of a connection is what the broker has retained. It ends with a message that the driver sends to itself
 on a topic of its own: the broker answers on one connection in order.
@@ -113,7 +115,8 @@ class MqttConnection(Stepwise):
             payload = str(int(value)) if isinstance(value, bool) else str(value)
             try:
                 with self.step(f"'{topic}'", withheld):
-                    await self.client.publish(topic, payload, qos=1, timeout=self.wanted.timeout_s)
+                    is_shown = topic in self.wanted.forced
+                    await self.client.publish(topic, payload, qos=1, retain=is_shown, timeout=self.wanted.timeout_s)
             except MqttError as error:
                 raise LinkError(f"'{topic}': {_why(error)}") from None
 

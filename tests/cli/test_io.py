@@ -85,6 +85,9 @@ def test_signals_are_shown_and_forced_only_where_the_binding_allows_it(
     assert "'robot.at_cv1' is `acknowledged`: its machine says when it is done" in capsys.readouterr().err
     assert main(["io", str(cell.bind), "--force", "robot.tuch=1"]) == 2
     assert "no signal 'robot.tuch' is read; did you mean 'robot.touch'?" in capsys.readouterr().err
+    for button in ("button", "emergency stop button"):
+        assert main(["io", str(cell.bind), "--force", f"{button}=0"]) == 2
+        assert f"'{button}' is a contact of the emergency stop, which is opened" in capsys.readouterr().err
 
 
 def test_sensors_of_a_cell_on_a_serial_line_can_be_forced_as_those_of_others(

@@ -113,3 +113,52 @@ def test_a_signal_that_its_device_never_shows_is_told_with_its_point(monkeypatch
         assert "never shown" not in (await ending).message
 
     asyncio.run(main())
+
+
+def test_a_machine_that_never_shows_what_it_has_done_is_told_though_it_shows_what_it_has_taken(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    theirs = EntryPoint("theirs", "support.third_party_driver:KIND", kinds.GROUP)
+    monkeypatch.setattr(kinds, "entry_points", lambda **_: [theirs])
+    net = parse_net("""
+firable: 1
+cell: lamp
+controllers:
+  a: {start: dark, places: {dark: , lit: {send: {machine: L, command: LIGHT}, until: is_lit}}}
+transitions:
+  on1: {from: a.dark, to: a.lit}
+  off1: {from: a.lit, to: a.dark}
+""")
+    binding = """
+firable_bind: 1
+cell: lamp
+devices:
+  near: {driver: theirs, memory: near, start_s: 0.05, channels: {lamp: {number: n, taken: t, done: dnoe}}}
+signals: {a.is_lit: acknowledged}
+commands: {a.lit: {device: near, channel: lamp}}
+"""
+
+    async def main() -> None:
+        near = MemoryEnd("near")
+        await near.start(lambda _point, value: near.show("t", value))
+        near.show("t", value=0)
+        told: list[str] = []
+        driver = bound_driver(parse_binding(binding), net)
+        host = Host(
+            split(net),
+            driver,
+            Recorder(net, net_digest(net), None),
+            operator=lambda _: asyncio.sleep(60),
+            tell=lambda _, sentence: told.append(sentence),
+        )
+        ending = asyncio.create_task(host.main())
+        sentence = (
+            "near: has never shown what 'lamp' has done (at dnoe): are the points written as the device has them?"
+        )
+        await until(lambda: sentence in told, "the sentence")
+        near.show("dnoe", value=0)
+        await until(lambda: not driver.unreached, "the number")
+        host.stop()
+        await ending
+
+    asyncio.run(main())

@@ -81,7 +81,7 @@ def test_no_command_leaves_between_the_block_that_shows_an_open_contact_and_the_
         await end.start(lambda point, value: written.append((point, value)))
         options = modbus.TcpOptions(host="127.0.0.1", port=end.port, every_s=0)
         document = parse_binding(BINDING).document.devices["D"]
-        kept = Kept(document, modbus.TCP, options, POINTS, cell, frozenset({CONTACT}))
+        kept = Kept(document, modbus.TCP, options, Wanted(sorted(POINTS), document.timeout_s, {CONTACT}), cell)
         cell.kept.append(kept)
         task = asyncio.create_task(kept.run())
         await until(lambda: kept.idle is not None, "the connection")

@@ -1,11 +1,14 @@
 """MQTT through mosquitto, which is started for each test."""
 
+import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 import pytest
 
-from firable.executor.drivers.bench import Far
+from firable.executor.drivers.bench import Far, until
+from firable.executor.drivers.binding import parse_binding
+from firable.executor.drivers.bound import BoundDriver
 from firable.executor.drivers.conformance import DriverConformance
 from firable.executor.drivers.far_side.machine import ROLES
 from firable.executor.drivers.far_side.mqtt_device import MqttEnd, mosquitto
@@ -14,10 +17,85 @@ ALIVE = "alive: {read: cell/M/button,within_s: 600}"
 """What a broker's device needs for an emergency stop; here it does not change."""
 
 
-@pytest.mark.skipif(mosquitto() is None, reason="needs the broker mosquitto, which is not installed")
+needs_mosquitto = pytest.mark.skipif(mosquitto() is None, reason="needs the broker mosquitto, which is not installed")
+
+
+@needs_mosquitto
 class TestMqtt(DriverConformance):
     @asynccontextmanager
     async def far_end(self) -> AsyncIterator[Far]:
         points = {role: f"cell/M/{role}" for role in (*ROLES, "command")}
         end = MqttEnd({points[role] for role in ("output", "beat", "code", "command")})
         yield Far(end, f"driver: mqtt, host: 127.0.0.1, port: {end.port}, {ALIVE}", points)
+
+
+class Unheard:
+    """Who listens to nothing."""
+
+    def now_seconds(self) -> float:
+        return asyncio.get_running_loop().time()
+
+    def loop_delay_seconds(self, until_seconds: float) -> float:
+        return until_seconds - self.now_seconds()
+
+    def signal(self, name: str, value: bool, entry: int | None) -> None:
+        pass
+
+    def taken(self, place: str, entry: int) -> None:
+        pass
+
+    def all_told(self) -> None:
+        pass
+
+    def moved(self) -> None:
+        pass
+
+    def driver_fault(self, machine: str, message: str) -> None:
+        pass
+
+    def driver_note(self, machine: str, message: str) -> None:
+        pass
+
+    def emergency_stop(self, reason: str) -> None:
+        pass
+
+
+@needs_mosquitto
+def test_whoever_connects_after_a_signal_was_forced_finds_it_forced_and_no_command_is_found_there() -> None:
+    """A device's own values are retained, and nothing that is written to command it."""
+
+    async def main() -> dict[str, bool | None]:
+        end = MqttEnd({"cell/lamp"})
+        written: list[object] = []
+        await end.start(lambda point, value: written.append((point, value)))
+        for topic in ("cell/key", "cell/lamp"):
+            end.show(topic, value=False)
+        binding = parse_binding(f"""
+firable_bind: 1
+cell: lamp
+devices:
+  box:
+    driver: mqtt
+    host: 127.0.0.1
+    port: {end.port}
+    safe: {{cell/lamp: false}}
+signals:
+  key: {{device: box, read: cell/key, force: true}}
+  lamp: {{device: box, read: cell/lamp, force: true}}
+""")
+        for turn in range(2):
+            driver = BoundDriver(binding, (), frozenset())
+            running = asyncio.create_task(driver.run(Unheard(), Unheard()))
+            await until(lambda d=driver: d.readings()["lamp"].value is not None, "the lamp")  # type: ignore[misc]
+            await until(lambda d=driver: d.readings()["key"].value is not None, "the key")  # type: ignore[misc]
+            found = {name: reading.value for name, reading in driver.readings().items()}
+            if turn == 0:
+                driver.force("key", value=True)
+                driver.force("lamp", value=True)
+                await until(lambda: ("cell/lamp", "1") in written, "the lamp is lit")
+            running.cancel()
+            await asyncio.gather(running, return_exceptions=True)
+        await end.stop()
+        return found
+
+    assert asyncio.run(main()) == {"key": True, "lamp": False}

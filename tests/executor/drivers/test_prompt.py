@@ -132,7 +132,7 @@ def served(then: Then, timeout_s: float = 5) -> tuple[list[list[Writes]], Comman
 
     async def main() -> None:
         document = parse_binding(BINDING.replace("timeout_s: 5", f"timeout_s: {timeout_s}")).document.devices["D"]
-        kept = Kept(document, kind, Options(), frozenset(), commands)
+        kept = Kept(document, kind, Options(), Wanted((), timeout_s), commands)
         task = asyncio.create_task(kept.run())
         await until(lambda: kept.idle is not None, "the connection")
         await then(kept, kind.made[0], commands)
@@ -256,7 +256,7 @@ def test_command_that_waits_for_an_answer_is_not_sent_after_a_stop(turns: int, p
         await end.start(lambda point, value: written.append((point, value)))
         options = modbus.TcpOptions(host="127.0.0.1", port=end.port, every_s=0)
         document = parse_binding(BINDING).document.devices["D"]
-        kept = Kept(document, modbus.TCP, options, frozenset({"input 0"}), commands)
+        kept = Kept(document, modbus.TCP, options, Wanted(("input 0",), document.timeout_s), commands)
         commands.kept.append(kept)
         task = asyncio.create_task(kept.run())
         await until(lambda: kept.idle is not None, "the connection")

@@ -39,6 +39,7 @@ def test_a_port_that_cannot_be_had_is_told_with_the_reason_in_words(kind: Any) -
         with Serial(line.near, exclusive=True):
             assert await refusal(line.near) == f"{line.near}: another program has it open"
         assert await refusal("/dev/nobody-is-here") == "/dev/nobody-is-here: No such file or directory"
+        assert await refusal("/dev/null") == "/dev/null: this is no serial port"
         line.close()
 
     asyncio.run(main())
