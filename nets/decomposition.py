@@ -9,6 +9,7 @@ owns. So Eq. (1) of a part is the factor of Eq. (7), and Eq. (2) the factor of E
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -80,6 +81,16 @@ class Decomposition:
     def table(self) -> tuple[Coordinated, ...]:
         """The coordinator table: the global transitions, in the order of the net."""
         return tuple(row for row in self.coordinated if row.is_global)
+
+    @property
+    def doubled(self) -> tuple[str, ...]:
+        """The names that two transitions of subnets bear, or two parts of the table: a split makes none.
+
+        A verdict on a part is known by its name alone, so with two of one name it would be a verdict on either.
+        """
+        borne = Counter(transition.name for subnet in self.subnets for transition in subnet.transitions)
+        borne |= Counter(part.name for row in self.coordinated for part in row.parts)
+        return tuple(name for name, times in borne.items() if times > 1)
 
     def _repr_svg_(self) -> str | None:
         """The coordinator diagram in a notebook; nothing of a net that is too large for a picture."""

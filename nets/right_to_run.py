@@ -126,6 +126,9 @@ def unproved(bundle: Bundle) -> tuple[Diagnostic, ...]:
                 if file not in bundle.evidence:
                     message = f"the evidence '{file}' for '{name}' is missing"
                     problems.append(Diagnostic("F5002", message, _REMEDY, subject))
+    for name in bundle.decomposition.doubled:
+        message = f"'{name}' names two parts, so that no verdict on it is known to be on either"
+        problems.append(Diagnostic("F5002", message, _REMEDY, ("transitions", name)))
     joins = _joins(bundle.decomposition)
     for transition, message in unfounded(bundle.decomposition, by_name) if joins else ():
         problems.append(Diagnostic("F5002", message, _REMEDY, ("transitions", transition)))

@@ -104,7 +104,7 @@ class Arbitration:
             raise InputError(problems)
         groups = []
         for c, members in enumerate(relation.components):
-            name, sequence, by = named.get(c, (f"conflict-{c + 1}", (), ArbitrationRule.PRIORITY))
+            name, sequence, by = named.get(c) or (_unnamed(net, c), (), ArbitrationRule.PRIORITY)
             first = set(sequence)
             rest = tuple(t for t in members if t not in first)
             groups.append(Group(name, sequence, rest, by))
@@ -163,3 +163,11 @@ def per_place_choice(orders: Mapping[str, Sequence[int]], enabled: Iterable[int]
     return tuple(
         t for t in sorted(candidates) if all(winners[place] == t for place, order in orders.items() if t in order)
     )
+
+
+def _unnamed(net: Net, component: int) -> str:
+    """What a component without an arbiter is called; no arbiter of the net may be called so."""
+    name, taken = f"conflict-{component + 1}", {arbiter.name for arbiter in net.arbiters}
+    while name in taken:
+        name = f"conflict-{name}"
+    return name

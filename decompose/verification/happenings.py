@@ -29,7 +29,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 
-from firable.decompose.verification.plant import ACCIDENT, OVERRUN, State, Things, Value, target_of
+from firable.decompose.verification.plant import ACCIDENT, OVERRUN, DiffersError, State, Things, Value, target_of
 from firable.nets.machines.loop import Faults, Sending
 from firable.nets.machines.plant_file import Action, Carry, Clamp, Grasp, Move, Process, Put, Release, Stop
 from firable.nets.net import Place, Transition
@@ -44,32 +44,47 @@ class Plant(Things):
 
     @cached_property
     def happenings(self) -> dict[str, Happens]:
-        """Everything that can happen, by its name: after a state, what changes, once for each way that it can go."""
-        found: dict[str, Happens] = {t.name: partial(self.fires, t) for t in self.net.transitions}
+        """Everything that can happen, by its name: after a state, what changes, once for each way that it can go.
+
+        Raises `DiffersError` where two have one name: the one would stand for the other in all that is asked.
+        """
+        found: dict[str, Happens] = {}
+        for name, happens in self._happenings():
+            if name in found:
+                raise DiffersError(f"two things that happen are called '{name}'")
+            found[name] = happens
+        return found
+
+    def _happenings(self) -> Iterator[tuple[str, Happens]]:
+        for t in self.net.transitions:
+            yield t.name, partial(self.fires, t)
         for place in self.commanding:
             if self.sending is Sending.LATE:
-                found[f"sent/{place.name}"] = partial(self.sent_late, place)
+                yield f"sent/{place.name}", partial(self.sent_late, place)
             if place.name not in self.stops:
-                found[f"{self.machine_of(place)}/done/{place.name}"] = partial(self.done, place)
-                found[f"{self.machine_of(place)}/accident/{place.name}"] = partial(self.spoils, place)
-        found |= {f"{self.machine_of(place)}/fails/{place.name}": partial(self.fails, place) for place in self.failing}
-        if self.faults is Faults.REPAIRED:
-            found |= {f"{name}/repaired": partial(self.repaired, name) for name in self.may_fail}
-        found |= {f"{name}/shown": partial(self.comes_to_be_shown, name) for name in self.sensed}
-        found[f"arrives/{self.model.arrivals.station}"] = self.arrives
-        found[f"leaves/{self.model.departures.station}"] = self.leaves
+                yield f"{self.machine_of(place)}/done/{place.name}", partial(self.done, place)
+                yield f"{self.machine_of(place)}/accident/{place.name}", partial(self.spoils, place)
+        for place in self.failing:
+            yield f"{self.machine_of(place)}/fails/{place.name}", partial(self.fails, place)
+        for name in self.may_fail if self.faults is Faults.REPAIRED else ():
+            yield f"{name}/repaired", partial(self.repaired, name)
+        for name in self.sensed:
+            yield f"{name}/shown", partial(self.comes_to_be_shown, name)
+        yield f"arrives/{self.model.arrivals.station}", self.arrives
+        yield f"leaves/{self.model.departures.station}", self.leaves
         for name, sensor in self.model.sensors.items():
             if sensor.acknowledges is not None:
-                found[f"{name}/pressed"] = partial(self.pressed, name)
-                found[f"{name}/released"] = partial(self.released, name)
+                yield f"{name}/pressed", partial(self.pressed, name)
+                yield f"{name}/released", partial(self.released, name)
             for way, may in (
                 ("drops", sensor.may_flicker),
                 ("returns", sensor.may_flicker),
                 ("clears", sensor.may_linger),
             ):
                 if may:
-                    found[f"{name}/{way}"] = partial(self.wavers, name, way)
-        return found | {f"{timer}/over": partial(self.over, timer) for timer in self.timers}
+                    yield f"{name}/{way}", partial(self.wavers, name, way)
+        for timer in self.timers:
+            yield f"{timer}/over", partial(self.over, timer)
 
     def fires(self, t: Transition, state: State) -> Iterator[Changes]:
         """Eq. (1)-(4), gates as the signals show them, once the commands of what it takes or reads have been sent."""

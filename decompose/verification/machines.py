@@ -23,9 +23,10 @@ from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.documents import ShownRecord, checked_document
 from firable.decompose.verification.happenings import Plant
 from firable.decompose.verification.loop_questions import Asked, Question
+from firable.decompose.verification.plant import DiffersError
 from firable.decompose.verification.recut import Cut
 from firable.decompose.verification.refusal import NotShownError
-from firable.decompose.verification.same_loop import DiffersError, compare
+from firable.decompose.verification.same_loop import compare
 from firable.decompose.verification.solvers import Answers
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import And, Constant, Firable, Formula, Holds, Not, Or

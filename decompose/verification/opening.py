@@ -2,7 +2,9 @@
 
 The second text of what `firable refine` does, so that a bundle can say from where its net comes. Here a net is taken
 apart into places and transitions under *keys*: those of the conceptual net under their names, those of a task under the
-place that it stands for and their names in the task, `system.loading/robot.grasp`. Each block, outer ones first, adds
+place that it stands for and their names in the task, with `INSIDE` between them. No name of a net has that, but one may
+have a slash: with slashes a move `sub/m` and the move `m` of a subtask `sub` would be one, and the last of the two hide
+the other from every question. Nothing is put under a key that something has. Each block, outer ones first, adds
 its own and changes the transitions that lead into its place and out of it; names come last (`naming_anew`). A block
 also remembers which of its places is which, since that is what the proof of the refinement is about (`relating`).
 
@@ -15,15 +17,19 @@ import re
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, TypeVar
 
 from firable.decompose.verification.refusal import NotShownError
 from firable.nets.net import Command, Net, Place, Signal
+from firable.nets.source import printable
 from firable.nets.tasks.model import Catalogue, Gate, Step, Task
 
 DEPTH_MAX: Final = 16
+INSIDE: Final = "\n"
+"""What stands between the names of a key."""
 _WORD: Final = re.compile(r"\{([^{}]*)\}")
 
+One = TypeVar("One")
 Literal = tuple[str, bool]
 """A signal by its full name, and the value that a gate wants."""
 
@@ -40,11 +46,15 @@ class Block:
     @property
     def key(self) -> str:
         """The key of the place that the block stands for."""
-        return "/".join(self.path)
+        return INSIDE.join(self.path)
 
     def inner(self, name: str) -> str:
         """The key of a step, a move or a subtask."""
-        return f"{self.key}/{name}"
+        return f"{self.key}{INSIDE}{name}"
+
+    def holds(self, key: str) -> bool:
+        """Whether a key is of something in the block, or in a block within it."""
+        return key.startswith(f"{self.key}{INSIDE}")
 
     def text(self, template: str) -> str:
         """A template, filled."""
@@ -175,12 +185,12 @@ class Opening:
             owner = self.places[block.filled[role.name]].owner
             local = block.text(step.place)
             kept = Kept(owner, local, step=step, description=block.text(step.description), block=block)
-            self.places[block.inner(name)] = kept
+            self._put(self.places, block, name, kept)
         outermost = self.places[block.path[0]]
         for subtask in task.subtasks:
             local = "_".join((outermost.local, *block.path[1:], subtask.name))
             kept = Kept(outermost.owner, local, description=block.text(subtask.description), block=block)
-            self.places[block.inner(subtask.name)] = kept
+            self._put(self.places, block, subtask.name, kept)
         late = {block.filled[role] for role in task.released if role not in task.start.releases}
         for move in self.moves.values():
             if block.key in move.outputs:
@@ -204,7 +214,13 @@ class Opening:
             made.permissive = {block.inner(step) for step in one.permissive}
             made.inhibitive = {block.inner(step) for step in one.inhibitive}
             self._gates(block, made, one.external)
-            self.moves[block.inner(one.name)] = made
+            self._put(self.moves, block, one.name, made)
+
+    @staticmethod
+    def _put(among: dict[str, One], block: Block, name: str, one: One) -> None:
+        """Keep something of a block under its key, which nothing else may have."""
+        if INSIDE in name or among.setdefault(block.inner(name), one) is not one:
+            raise NotShownError(f"the task '{block.task.name}' has two of '{printable(name)}', or no name there")
 
     def _gates(self, block: Block, move: Move, gates: tuple[Gate, ...]) -> None:
         for gate in gates:

@@ -22,6 +22,10 @@ Value = str | bool | None
 State = Mapping[str, Value]
 
 
+class DiffersError(Exception):
+    """The net of the loop is not what the plant file says, and where."""
+
+
 @dataclass(frozen=True)
 class Things:
     """A net with the machines of a plant file; each thing has a name here, and a value in each state.
@@ -69,8 +73,13 @@ class Things:
 
     @cached_property
     def thing_of(self) -> dict[str, str]:
-        """The thing that each place of the loop is of."""
-        return {place: thing for thing, places in self.things.items() for place in places.values()}
+        """The thing that each place of the loop is of; raises `DiffersError` where one is of two."""
+        found: dict[str, str] = {}
+        for thing, places in self.things.items():
+            for place in places.values():
+                if found.setdefault(place, thing) != thing:
+                    raise DiffersError(f"'{place}' stands for the {found[place]}, and for the {thing}")
+        return found
 
     def values(self, thing: str) -> list[Value]:
         """The values that a thing may have; no machine is ever at a command that stops it."""

@@ -230,6 +230,8 @@ class Cut:
                 raise NotShownError(f"the conflict of '{members[0]}' does not have one arbiter of its own")
             name, by = f"conflict-{number}", ArbitrationRule.PRIORITY
             among: tuple[str, ...] = ()
+            while name in {arbiter.name for arbiter in self.net.arbiters}:
+                name = f"conflict-{name}"
             if arbiters:
                 name, among, by = arbiters[0].name, arbiters[0].among, arbiters[0].by
             rest = tuple(t for t in members if t not in set(among))
@@ -294,8 +296,15 @@ def is_late(net: Net, t: Transition, place: str) -> bool:
 
 
 def check_cut(decomposition: Decomposition) -> Cut:
-    """The cut of the net of a decomposition; raises `NotShownError` where the decomposition is another one."""
+    """The cut of the net of a decomposition; raises `NotShownError` where the decomposition is another one.
+
+    So it does where two parts have one name, that of a local transition included: verdicts on votes go by that name.
+    """
     cut = Cut(decomposition.net)
+    borne = [part.name for its in cut.parts.values() for part in its]
+    if len(borne) > len({*borne}):
+        twice = next(name for name in borne if borne.count(name) > 1)
+        raise NotShownError(f"the net cannot be split: two parts are named '{twice}'", "net")
     try:
         found = next(_differences(cut, decomposition), None)
     except (InputError, ValueError) as error:  # its parts are no nets

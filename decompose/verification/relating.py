@@ -204,7 +204,7 @@ class Relation:
     def _inside(self, key: str, t: Transition) -> Iterator[tuple[str, list[str]]]:
         block = self.named.opening.moves[key].block
         assert block is not None
-        of = self.closed(block.task.name).net.transition(key.removeprefix(f"{block.key}/"))
+        of = self.closed(block.task.name).net.transition(key.removeprefix(block.inner("")))
         inner, then = self.closed(block.task.name).inner, _changes(t)
         place = {name: self.named.places[block.inner(name)] for name in inner}
         blocks, resources = self._concerned(t, ())
@@ -217,7 +217,7 @@ class Relation:
         steps = {place[name]: False for name in of.inputs} | {place[name]: True for name in of.outputs if name in place}
         others = (self.key_of[p] for p in then if p not in place.values())
         as_alone = all(then.get(p) == steps.get(p) for p in place.values()) and all(
-            key in self.holders or key.startswith(f"{block.key}/") for key in others
+            key in self.holders or block.holds(key) for key in others
         )
         fires, contact = self._firable(t), self._contact(t)
         kept = [*self._unchanged(set(), t, then), *self.related(blocks, resources, then)]

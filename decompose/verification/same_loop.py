@@ -15,16 +15,12 @@ from math import prod
 from typing import Final
 
 from firable.decompose.verification.happenings import Plant
-from firable.decompose.verification.plant import ACCIDENT, OVERRUN, Value
+from firable.decompose.verification.plant import ACCIDENT, OVERRUN, DiffersError, Value
 from firable.nets.machines.loop import ClosedLoop, Sending
 from firable.nets.net import Transition
 
 STATES_MAX: Final = 1_000_000
 """In how many states one happening is compared; one that looks at more things is refused."""
-
-
-class DiffersError(Exception):
-    """The net of the loop is not what the plant file says, and where."""
 
 
 def compare(plant: Plant, loop: ClosedLoop) -> int:

@@ -113,12 +113,14 @@ class _Closing:
         variants = {transition.name: tuple(self.of_cell(transition)) for transition in self.net.transitions}
         for transition in self.net.transitions:
             _assert_projects(self.net, transition, variants[transition.name])
-        moves, times = tuple(self.moves()), tuple(self.times())
+        moves, times, places = tuple(self.moves()), tuple(self.times()), tuple(self.places())
+        if taken := tuple(_taken(self.net, (*moves, *times), places)):
+            raise InputError(taken)
         _assert_apart(self.net, moves, times)
         moves += times
         net = Net(
             self.net.name,
-            (*(replace(place, completion=None, within=None) for place in self.net.places), *self.places()),
+            (*(replace(place, completion=None, within=None) for place in self.net.places), *places),
             (*chain.from_iterable(variants.values()), *moves),
             controllers=(*self.net.controllers, Controller(PLANT, description="Machines and workpieces")),
             description=f"{self.net.description} (with its machines)",
@@ -392,6 +394,18 @@ def _too_many(transition: Transition) -> InputError:
     message = f"'{transition.name}' sends commands with more than {VARIANTS_MAX:,} outcomes in one firing"
     hint = "send them one after the other, in transitions of their own"
     return InputError([Diagnostic("F3007", message, hint, ("transitions", transition.name, "to"))])
+
+
+def _taken(net: Net, moves: Iterable[Transition], places: Iterable[Place]) -> Iterator[Diagnostic]:
+    """The names of the net that the plant needs: what happens at a machine has its name, and words behind a slash."""
+    hint = "rename it: the places of the plant, and what happens in it, have names of that form"
+    for name in (place.name for place in places if place.name in net.place_index):
+        yield Diagnostic("F2001", f"'{name}' names one of the places, and a thing of the plant", hint, ("places", name))
+    parts = (move.name.split("/") for move in moves)
+    begun = {"/".join(some[:length]) for some in parts for length in range(1, len(some) + 1)}
+    for name in (t.name for t in net.transitions if "/" in t.name and t.name in begun):
+        message = f"'{name}' names one of the transitions, and what happens in the plant"
+        yield Diagnostic("F2001", message, hint, ("transitions", name))
 
 
 def _assert_projects(net: Net, transition: Transition, variants: Iterable[Transition]) -> None:

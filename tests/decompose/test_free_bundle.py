@@ -11,6 +11,7 @@ from support.reference import load_net
 
 from firable.analysis.check import check
 from firable.decompose.bundling import make_bundle
+from firable.decompose.splitting import cut
 from firable.decompose.splitting.cut import split
 from firable.decompose.splitting.persistence import persistence
 from firable.decompose.verification.checked import Examination
@@ -25,6 +26,7 @@ from firable.nets.bundle import Bundle, read_bundle, write_bundle
 from firable.nets.catalogue import catalogue_net
 from firable.nets.diagnostics import InputError
 from firable.nets.right_to_run import unproved
+from firable.nets.text import parse_net
 from firable.nets.verdict import Status, Verdict
 
 Free = tuple[tuple[str, str], ...]
@@ -148,3 +150,36 @@ def test_vote_that_arcs_and_units_show_needs_their_evidence() -> None:
     assert [problem.message for problem in unproved(replace(bundle, verdicts=bare))] == [
         "the vote on 't1-11' is said to be persistent without evidence"
     ]
+
+
+CLASH = """
+firable: 1
+cell: clash
+controllers:
+  sys: {coordinator: true}
+  a: {start: [p, r], places: {p: , q: , r: , s: }}
+  b: {start: [x, wo], places: {x: , y: , z: , w: , wo: }}
+transitions:
+  G: {number: 1, from: [a.p, b.x], to: [a.q, b.y], if: a.r, unless: b.w}
+  H: {number: 2, from: [a.q, b.y], to: [a.p, b.x]}
+  u: {from: a.r, to: a.s}
+  v: {from: a.s, to: a.r}
+  t1-11: {from: b.x, to: b.z, if: b.w}
+  M: {from: b.z, to: b.x}
+  W1: {from: b.w, to: b.wo, if: b.z}
+  W2: {from: b.wo, to: b.w}
+"""
+"""The vote of G's part at a, t1-11, falls when u fires; that of the transition t1-11 at b, were it one, stands."""
+
+
+def test_a_transition_with_the_name_of_a_part_lends_its_verdict_to_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+    net = parse_net(CLASH)
+    with pytest.raises(InputError, match="'t1-11' is also the name of a part of 'G'"):
+        split(net)
+    monkeypatch.setattr(cut, "_clashes", lambda _: iter(()))
+    clashing = split(net)
+    found = unproved(Bundle(clashing, ()))
+    assert "'t1-11' names two parts" in " ".join(problem.message for problem in found)
+    with pytest.raises(NotShownError, match="two parts are named 't1-11'"):
+        check_cut(clashing)
+    assert not cell().decomposition.doubled

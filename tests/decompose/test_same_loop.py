@@ -11,15 +11,18 @@ from typing import Any
 import pytest
 
 from firable.decompose.verification.happenings import Plant
-from firable.decompose.verification.same_loop import DiffersError, by_happening, compare, compare_one
+from firable.decompose.verification.plant import DiffersError
+from firable.decompose.verification.same_loop import by_happening, compare, compare_one
 from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.diagnostics import InputError
+from firable.nets.machines import closing
 from firable.nets.machines.closing import _Closing, close
 from firable.nets.machines.laws import Laws
 from firable.nets.machines.loop import ClosedLoop, Faults, Sending
 from firable.nets.machines.moment import Case
-from firable.nets.machines.plant_file import PlantModel
+from firable.nets.machines.plant_file import PlantModel, parse_plant
 from firable.nets.net import Net, Place, Transition
+from firable.nets.text import parse_net
 
 CELLS = (
     *("one_robot", "one_robot_mc_late", "one_robot_mc_late_capacity", "one_robot_timed"),
@@ -248,3 +251,45 @@ def test_a_place_of_the_net_may_bear_any_name_that_the_plant_does_not() -> None:
     net, model, loop = closed("one_robot")
     assert Place("plant.MC.idle", "plant") not in net.places
     assert set(Plant(net, model).thing_of) == {place.name for place in loop.net.places}
+
+
+HANG = """
+firable: 1
+cell: hang
+controllers:
+  sys: {coordinator: true}
+  a: {start: p, inputs: [s1, s2], places: {p: , q: }}
+transitions:
+  arrives/CV1: {from: a.p, to: a.q, if: a.s1, unless: a.s2}
+  back: {from: a.q, to: a.p}
+"""
+HANG_PLANT = """
+firable_plant: 1
+plant: hang
+stations: [CV1]
+arrivals: {station: CV1, every_s: 1}
+departures: {station: CV1}
+machines: {}
+sensors: {a.s1: {occupied: CV1}, a.s2: {occupied: CV1}}
+"""
+
+
+def test_no_transition_of_the_cell_is_taken_for_what_happens_at_a_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The two sensors are never different, so the transition never fires; but workpieces arrive."""
+    net, model = parse_net(HANG), parse_plant(HANG_PLANT, "hang.plant.yaml")
+    with pytest.raises(InputError, match="'arrives/CV1' names one of the transitions, and what happens in the plant"):
+        close(net, model)
+    monkeypatch.setattr(closing, "_taken", lambda *_: ())
+    loop = close(net, model)
+    with pytest.raises(DiffersError, match="two things that happen are called 'arrives/CV1'"):
+        compare(Plant(net, model, Sending.AT_ONCE), loop)
+
+
+def test_a_place_of_the_cell_with_the_name_of_a_place_of_the_plant_is_refused() -> None:
+    renamed = HANG.replace("arrives/CV1:", "go:").replace("  a: {start: p", "  plant: {start: CV1.raw")
+    net = parse_net(renamed.replace("{p: ,", "{CV1.raw: ,").replace("a.p", "plant.CV1.raw").replace("a.", "plant."))
+    model = parse_plant(HANG_PLANT.replace("a.s", "plant.s"), "hang.plant.yaml")
+    with pytest.raises(InputError, match=r"'plant\.CV1\.raw' names one of the places, and a thing of the plant"):
+        close(net, model)
+    with pytest.raises(DiffersError, match=r"'plant\.CV1\.raw' stands for the token of plant\.CV1\.raw"):
+        _ = Plant(net, model).thing_of

@@ -61,6 +61,13 @@ def test_a_conflict_over_an_output_does_not_turn_the_rotation() -> None:
     assert arbitration.decide([0, 1], arbitration.first_turns) == ((0,), (0,))
 
 
+def test_a_component_without_an_arbiter_is_not_called_as_the_arbiter_of_another() -> None:
+    transitions = tuple(Transition(f"t{i}", ("p" if i < 2 else "q",)) for i in range(4))
+    arbiter = Arbiter("conflict-2", ("t0", "t1"), ArbitrationRule.PRIORITY)
+    arbitration = Arbitration.of(Net("n", tuple(map(Place, "pq")), transitions, arbiters=(arbiter,)))
+    assert [group.name for group in arbitration.groups] == ["conflict-2", "conflict-conflict-2"]
+
+
 def test_components_without_an_arbiter_are_numbered_from_one_and_decided_in_the_order_of_the_file() -> None:
     places = (Place("p"), Place("q"))
     transitions = tuple(Transition(t, (p,)) for t, p in (("t", "p"), ("u", "p"), ("v", "q"), ("w", "q")))

@@ -431,3 +431,27 @@ def test_properties_and_arbiters_of_the_conceptual_net_are_not_taken_along() -> 
         True
     }
     assert Status.PROVED in {verdict.status for verdict in bundle.verdicts}
+
+
+def test_names_with_slashes_hide_nothing_of_a_task_from_the_checker() -> None:
+    """The move `fetch/m` of a task and the move `m` of its subtask `fetch` are two."""
+    net, tasks = lending()
+    fetch, work = tasks["fetch"], tasks["work"]
+    (first, *others) = work.moves
+    (subtask,) = {one.name for one in work.subtasks if one.use.name == "fetch"}
+    like = {**tasks, "work": replace(work, moves=(replace(first, name=f"{subtask}/m"), *others))}
+    opened = Opening(net, like)
+    outer, inner = opened.blocks
+    assert {outer.inner(f"{subtask}/m"), inner.inner("m")} <= {*opened.moves}
+    assert len(opened.moves) == len(net.transitions) + len(work.moves) + len(fetch.moves)
+    assert outer.holds(outer.inner(f"{subtask}/m"))
+    assert not inner.holds(outer.inner(f"{subtask}/m"))
+
+
+@pytest.mark.parametrize("name", ["twice", "a\nb"])
+def test_a_task_with_two_things_of_one_name_or_with_no_name_is_refused(name: str) -> None:
+    net, tasks = lending()
+    work = tasks["work"]
+    again = (replace(work.moves[0], name=name),) * 2
+    with pytest.raises(NotShownError, match="the task 'work' has two of"):
+        Opening(net, {**tasks, "work": replace(work, moves=(*work.moves, *again))})
