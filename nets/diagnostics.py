@@ -149,7 +149,7 @@ CODES: Final[dict[str, str]] = {
     "F5063": "a run that cannot be operated",
     "F5070": "a request of the page that cannot be answered",
     "F5101": "the binding does not fit the net",
-    "F5102": "not an address that the device has",
+    "F5102": "an address or a value that does not fit the device",
     "F5103": "unknown or unusable driver",
     "F5104": "a device that cannot be served here",
     "F5105": "a device with machines of several hosts",

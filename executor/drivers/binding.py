@@ -21,8 +21,9 @@ from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from firable.executor.drivers.device import DeviceKind, Options, Point, Use, Value, Writes, files_of
+from firable.executor.drivers.device import Bounded, DeviceKind, Options, Point, Use, Value, Writes, files_of
 from firable.executor.drivers.kinds import kind_named
+from firable.executor.drivers.overlapping import overlaps
 from firable.nets.diagnostics import Diagnostic, InputError, did_you_mean
 from firable.nets.document_errors import Shape, document_problems, keys_of, version_problem
 from firable.nets.source import Source, printable, quoted, read_bytes, read_source
@@ -339,6 +340,7 @@ class _Reading:
         for name, device in self.document.devices.items():
             for path, point, use in _device_points(device):
                 self.point(name, ("devices", name, *path), point, use)
+            self.values(name, ("devices", name, "safe"), device.safe)
             for channel, body in device.channels.items():
                 ways = [one for one in (body.number, body.command, body.request) if one is not None]
                 if len(ways) != 1:
@@ -369,6 +371,9 @@ class _Reading:
                 self.problem("F5101", ("commands", place, "channel"), message, hint)
             for point in command.write:
                 self.point(command.device, ("commands", place, "write", point), point, Use.WRITE)
+            self.values(command.device, ("commands", place, "write"), command.write)
+        for path, message, hint in overlaps(self.document):
+            self.problem("F5102", path, message, hint)
 
     def contact(self, name: str, contact: EmergencyDocument) -> None:
         self.point(contact.device, ("emergency_stop", name, "read"), contact.read, Use.READ)
@@ -388,6 +393,17 @@ class _Reading:
         if problem := self.kinds[device].point_problem(point, use):
             hint = f"the addresses of `driver: {self.document.devices[device].driver}` are described in docs/drivers.md"
             self.problem("F5102", path, f"{quoted(point)} cannot be a point to {use}: {problem}", hint)
+
+    def values(self, device: str, path: TreePath, mapping: Mapping[Point, str]) -> None:
+        """Judge what is to be written to points, as far as they are points of the device."""
+        kind = self.kinds[device]
+        if not isinstance(kind, Bounded):
+            return
+        for point, value in writes(mapping):
+            if not kind.point_problem(point, Use.WRITE) and (problem := kind.value_problem(point, value)):
+                message = f"{quoted(str(value))} cannot be written to '{point}': {problem}"
+                hint = "look up what the device understands, and write a value that it has"
+                self.problem("F5102", (*path, point), message, hint)
 
 
 _CHANNEL_POINTS: Final[Mapping[str, Use]] = {

@@ -129,12 +129,13 @@ class StoppingConformance:
 
         async def test(b: Bench) -> None:
             async with b.connected():
-                b.far.end.faults.silent = True
+                b.far.end.faults.delay_s = 0.1  # a heartbeat may be on its way, which is answered
                 b.driver.send(b.place("halt"), 1)
                 await until(lambda: b.driver.devices["D"].kept.writing, "the command is on its way")
+                b.far.end.faults.silent = True
                 b.driver.stop()
                 await until(lambda: b.driver.devices["D"].kept.writing is None, "it is broken off")
-                b.far.end.faults.silent = False
+                b.far.end.faults.silent, b.far.end.faults.delay_s = False, 0.0
                 await until(b.driver.devices["D"].kept.stopped.is_set, "the stop is over")
             assert b.machine.events[-1] == "output"
             assert b.driver.unconfirmed == ()

@@ -125,7 +125,9 @@ class Wanted:
 
 
 class Connection(Protocol):
-    """One connection to a device. `read` is called by one task, `write` by another, at the same time; but `read` first.
+    """One connection to a device. `read` is called by one task, `write` by another, at the same time.
+
+    The first `read` comes before that, but where the device is to be stopped: there the safe outputs wait for nothing.
 
     Any of them raises `LinkError` or `OSError` when the connection has failed; then it is closed, and never used again.
     """
@@ -209,6 +211,15 @@ def is_to_itself(transport: asyncio.BaseTransport | None) -> bool:
     if transport is None or transport.get_extra_info("peername") is None:
         return False
     return bool(transport.get_extra_info("sockname") == transport.get_extra_info("peername"))
+
+
+@runtime_checkable
+class Bounded(Protocol):
+    """A kind of device (`DeviceKind`) whose points do not take every value."""
+
+    def value_problem(self, point: Point, value: Value) -> str:
+        """What is wrong with a value for a point that is written, as a sentence without its end; else nothing."""
+        ...
 
 
 class DeviceKind(Protocol):

@@ -8,12 +8,14 @@ earlier. A connection that has failed in any way is closed and never asked again
 that doubles up to a bound, and is read before it is written, because what the device shows then decides what is still
 to be sent.
 
-A stop breaks off what is being written, if it is not confirmed at once, and makes new connections until the device has
-confirmed the safe outputs, or has had its time. What has not been sent by then is not sent any more: a command may wait
-behind the very question whose answer is the reason of the stop, or be sent in steps. A connection that cannot tell what
-it has sent (`device.Withholding`) is broken off at once. And where a command was sent that was never confirmed, the
-safe outputs are written once more when the time of its answer is over: what an earlier connection still brings must not
-be the last thing that a device gets.
+A stop breaks off a command that is being written, if it is not confirmed at once, and makes new connections until the
+device has confirmed the safe outputs, or has had its time. On these, and on each connection after an emergency stop,
+the safe outputs are written before anything is read: a device may take a tenth of a second for each answer, and have
+ten of them to give. What has not been sent by then is not sent any more: a command may wait behind the very question
+whose answer is the reason of the stop, or be sent in steps. A connection that cannot tell what it has sent
+(`device.Withholding`) is broken off at once. And where a command was sent that was never confirmed, the safe outputs
+are written once more when the time of its answer is over: what an earlier connection still brings must not be the last
+thing that a device gets.
 
 An error that is no failure of a link is a mistake, in a library or in what is served here. It ends the run, and this
 device is stopped as any other: over a new connection of which nothing is taken, since what it shows may be what nobody
@@ -267,8 +269,23 @@ class Kept:
             await connection.close()
 
     async def _serve(self, connection: Connection) -> None:
-        self._take(await connection.read())
-        await self._first_of(self._read(connection), self._write(connection))
+        if self.stopping:  # nothing that it shows decides what is written, and the safe outputs do not wait for it
+            await self._first_of(self._write(connection), self._read(connection))
+        else:
+            self._take(await self._first_read(connection))
+            await self._first_of(self._read(connection), self._write(connection))
+
+    async def _first_read(self, connection: Connection) -> Sequence[tuple[Point, Value]]:
+        """What the device shows; after an emergency stop behind the safe outputs, for it may take its time."""
+        if not (self.safe and self.served.is_latched):
+            return await connection.read()
+        tasks = asyncio.create_task(connection.write(self.safe)), asyncio.create_task(connection.read())
+        try:
+            await tasks[0]
+            self.started = True
+            return await tasks[1]
+        finally:
+            await ended(tasks)
 
     async def _first_of(self, *work: Coroutine[Any, Any, None]) -> None:
         """Do several things until one ends or fails."""
@@ -295,12 +312,13 @@ class Kept:
                 self.urge()
 
     async def _write(self, connection: Connection) -> None:
-        if (not self.started or self.served.is_latched) and not self.stopping:
+        if not self.started and not self.stopping:
             if self.safe:
                 await connection.write(self.safe)
             self.started = True
         self.connections += 1
-        self.served.ready()
+        if not self.stopping:
+            self.served.ready()
         loop = asyncio.get_running_loop()
         self.prompt = connection if isinstance(connection, Prompt) else None
         self.withholding = connection if isinstance(connection, Withholding) else None
@@ -322,7 +340,7 @@ class Kept:
                     self.served.written()
             elif is_due and heartbeat is not None:
                 beaten, due = True, loop.time() + heartbeat.every_s
-                await self._put(connection.write(((heartbeat.write, self.beat),)), moves=False)
+                await connection.write(((heartbeat.write, self.beat),))  # moves nothing: a stop waits for its answer
                 self.beat = (self.beat + 1) % BEATS
             else:
                 timer = None if heartbeat is None else loop.call_later(due - loop.time(), self.awake.set)
@@ -340,7 +358,7 @@ class Kept:
             await asyncio.sleep(late_s)
             await connection.write(self.safe)
 
-    async def _put(self, writing: Coroutine[Any, Any, None], *, moves: bool = True) -> bool:
+    async def _put(self, writing: Coroutine[Any, Any, None]) -> bool:
         """Write, and break it off at a stop, so that no machine starts after it; the connection is of no use then.
 
         Returns whether it is written: what was not sent before the stop is withheld, and costs no connection.
@@ -354,8 +372,7 @@ class Kept:
         except WithheldError:
             return False
         except BaseException as error:
-            if moves:
-                self._doubt()
+            self._doubt()
             if isinstance(error, TimeoutError) and self.stopping:
                 raise LinkError("stopped while something was written") from None
             raise

@@ -16,13 +16,14 @@ from firable.executor.drivers.device import (
     Options,
     Point,
     Use,
+    Value,
     Wanted,
     drop_at_close,
     is_to_itself,
     quiet,
 )
 from firable.executor.drivers.modbus_connection import ModbusConnection
-from firable.executor.drivers.modbus_points import WRITTEN, address
+from firable.executor.drivers.modbus_points import BITS, REGISTER_MAX, REGISTER_MIN, WRITTEN, address
 from firable.executor.reasons import port_reason
 
 if TYPE_CHECKING:
@@ -61,6 +62,14 @@ class _Modbus:
         if use is Use.WRITE and found.table not in WRITTEN:
             return f"nobody can write a {found.table} but the device"
         return ""
+
+    def value_problem(self, point: Point, value: Value) -> str:
+        """What is wrong with a value: a bit is 0 or 1, and a register a whole number of 16 bits, with a sign or not."""
+        found = address(point)
+        if found.table in BITS or found.bit is not None:
+            return "" if value in {0, 1} else "a bit takes 0 or 1"
+        is_whole = isinstance(value, int) and REGISTER_MIN <= value <= REGISTER_MAX
+        return "" if is_whole else f"a register takes whole numbers from {REGISTER_MIN} to {REGISTER_MAX}"
 
 
 class ModbusTcp(_Modbus):

@@ -285,8 +285,9 @@ class ModbusConnection(Stepwise):
         except self.failures as error:
             raise LinkError(f"{question.what}: {str(error).removeprefix('Modbus Error: ')}") from None
         finally:
-            self.is_asking = False
-            self._hand_on()
+            if not answer.cancelled():  # who leaves a question ends the connection: nothing more is asked on it
+                self.is_asking = False
+                self._hand_on()
         if shown.function_code & ~_REFUSED != question.request.function_code:
             raise LinkError(f"an answer to another question than that for {question.what}")
         self.is_owed = False

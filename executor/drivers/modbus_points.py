@@ -19,6 +19,8 @@ TABLES: Final = ("coil", "discrete", "input", "holding")
 BITS: Final = ("coil", "discrete")
 WRITTEN: Final = ("coil", "holding")
 ADDRESS_MAX: Final = 65_535
+REGISTER_MIN: Final = -(1 << 15)
+REGISTER_MAX: Final = (1 << 16) - 1
 AT_ONCE_MAX: Final = {"coil": 1968, "discrete": 2000, "input": 125, "holding": 123}
 """How many a request may carry, by the standard."""
 

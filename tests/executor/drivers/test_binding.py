@@ -155,6 +155,48 @@ def test_what_is_no_address_of_the_device_for_its_use_is_refused(old: str, new: 
 @pytest.mark.parametrize(
     ("old", "new", "place"),
     [
+        ("write: {holding 2: 7}", "write: {holding 2: 65536}", "17: holding 2"),
+        ("write: {holding 2: 7}", "write: {holding 2: -32769}", "17: holding 2"),
+        ("write: {holding 2: 7}", "write: {holding 2: 1.5}", "17: holding 2"),
+        ("write: {holding 2: 7}", "write: {holding 2: MOVE}", "17: holding 2"),
+        ("write: {holding 2: 7}", "write: {holding 2.3: 7}", "17: holding 2.3"),
+        ("safe: {coil 1: false}", "safe: {coil 1: 2}", "9: coil 1"),
+    ],
+)
+def test_a_value_that_its_point_cannot_take_is_refused(old: str, new: str, place: str) -> None:
+    assert refusal(edited(old, new)) == [("F5102", place)]
+
+
+@pytest.mark.parametrize("value", ["65535", "-32768", "0", "true"])
+def test_values_of_16_bits_are_taken_with_a_sign_and_without(value: str) -> None:
+    parse_binding(edited("write: {holding 2: 7}", f"write: {{holding 2: {value}}}"))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place"),
+    [
+        ("write: holding 0,", "write: holding 1,", "7: write"),
+        ("number: holding 5", "number: holding 1", "12: number"),
+        ("write: {holding 2: 7}", "write: {holding 1: 7}", "17: holding 1"),
+        ("write: {holding 2: 7}", "write: {holding 0: 7}", "17: holding 0"),
+        ("done: input 2", "done: input 1", "11: done"),
+        ("number: holding 5", "number: holding 5, taken: input 1", "12: taken"),
+        ("taken: input 1", "taken: holding 1", "11: taken"),
+        ("number: holding 5", "number: holding 5, failed: input 2", "12: failed"),
+    ],
+)
+def test_a_point_that_would_mean_two_things_is_refused(old: str, new: str, place: str) -> None:
+    assert refusal(edited(old, new)) == [("F5102", place)]
+
+
+def test_a_common_alarm_of_machines_without_numbers_and_requests_among_the_safe_outputs_are_taken() -> None:
+    text = edited("number: holding 1, taken: input 1, done: input 2", "request: coil 1, done: coil 2, failed: coil 4")
+    parse_binding(text.replace("number: holding 5", "request: coil 5, done: coil 6, failed: coil 4"))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place"),
+    [
         ("N: {number: holding 5}", "N: {number: holding 5, command: holding 6}", "12: N"),
         ("N: {number: holding 5}", "N: {taken: input 5}", "12: N"),
         ("{device: plc, read: discrete 0,", "{device: pcl, read: discrete 0,", "14: device"),
