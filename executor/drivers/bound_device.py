@@ -216,6 +216,8 @@ class BoundDevice:
                 self._replied(channel, key, point, value)
             if point == self.tripped:
                 self._watchdog(value)
+        for channel in self.channels.values():
+            self._told_if_forgotten(channel.forgotten())
         if self.driver.listener is not None:
             self.driver.listener.all_told()
 
@@ -226,8 +228,7 @@ class BoundDevice:
         self.note("connected again" if self.was_ready else "connected")
         self.noted = ""
         for channel in self.channels.values():
-            if (forgotten := channel.connected_again()) is not None:
-                self._fault(f"knows nothing any more of '{forgotten.text}' of '{forgotten.place}', which it had taken")
+            self._told_if_forgotten(channel.connected_again())
             self._await_taking(channel)
         if not self.was_ready:
             loop = asyncio.get_running_loop()
@@ -365,6 +366,10 @@ class BoundDevice:
             case Said.DONE:
                 if (completion := self.driver.completing.get(order.place)) is not None:
                     self.driver.formed(completion, self.driver.completions.acknowledged(completion, order.entry))
+
+    def _told_if_forgotten(self, order: Order | None) -> None:
+        if order is not None:
+            self._fault(f"knows nothing any more of '{order.text}' of '{order.place}', which it had taken")
 
     def _watchdog(self, value: Value) -> None:
         tripped = as_bit(value)

@@ -203,6 +203,16 @@ class Channel:
             return self.outstanding.pop(order.number, None)
         return None
 
+    def forgotten(self) -> Order | None:
+        """The newest order, once, where the device had shown that it has it and shows nothing of it any more.
+
+        To be asked when all that has come is known: `taken` may go in the same batch in which `done` comes.
+        """
+        order = self.current
+        if order is None or not self.is_taken or self.phase is not _Phase.WRITTEN or self.shown.get("taken") is None:
+            return None
+        return None if order.number in self.shown.values() else self.outstanding.pop(order.number, None)
+
     def expect(self, place: str, entry: int) -> None:
         """Take up a command that was sent before a restart, so that its outcome is told if it comes."""
         number = self.number(place, entry)

@@ -142,6 +142,10 @@ class Handshake:
             return order
         return None
 
+    def forgotten(self) -> Order | None:
+        """Nobody can tell: a bit that says at work may fall a moment before the bit that says done rises."""
+        return None
+
     def is_at(self, place: str, entry: int) -> bool:
         """Whether the device shows that it is at work, at whatever it was asked for last."""
         del place, entry  # it knows neither

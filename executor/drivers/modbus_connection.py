@@ -253,9 +253,17 @@ class ModbusConnection(Stepwise):
                 await self._turn()
                 with self.step(question.what, withheld):
                     await self._confirmed(self.ask(question), question)
-        finally:
-            self.is_free.set()
-            self._hand_on()
+        except asyncio.CancelledError:
+            raise  # broken off: the connection ends, and no poll that has waited is sent before
+        except BaseException:
+            self._free()
+            raise
+        else:
+            self._free()
+
+    def _free(self) -> None:
+        self.is_free.set()
+        self._hand_on()
 
     @property
     def _is_idle(self) -> bool:
@@ -285,8 +293,8 @@ class ModbusConnection(Stepwise):
         except self.failures as error:
             raise LinkError(f"{question.what}: {str(error).removeprefix('Modbus Error: ')}") from None
         finally:
-            if not answer.cancelled():  # who leaves a question ends the connection: nothing more is asked on it
-                self.is_asking = False
+            self.is_asking = False
+            if not answer.cancelled():
                 self._hand_on()
         if shown.function_code & ~_REFUSED != question.request.function_code:
             raise LinkError(f"an answer to another question than that for {question.what}")

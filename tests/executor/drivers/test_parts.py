@@ -231,6 +231,30 @@ def test_device_that_has_forgotten_a_command_is_not_given_it_again() -> None:
     assert one.next_writes() is None
 
 
+def test_command_that_a_device_forgets_on_the_same_connection_is_told_once_and_one_that_it_has_done_is_not() -> None:
+    one = channel("a", "b", answered="ab")
+    first, second = one.number("a", 1), one.number("b", 1)
+    one.send("a", 1, "RUN", ())
+    assert one.forgotten() is None
+    after(one, taken=0, done=0)
+    one.written()
+    assert one.forgotten() is None, "it has not shown that it has it"
+    one.shows("taken", first)
+    assert one.forgotten() is None
+    one.shows("taken", 0)
+    one.shows("done", first)  # in one batch
+    assert one.forgotten() is None
+    one.send("b", 1, "STOP", ())
+    after(one)
+    one.written()
+    one.shows("taken", second)
+    one.shows("taken", "?")  # which says nothing
+    assert one.forgotten() is None
+    one.shows("taken", first)
+    assert one.forgotten() == Order("b", 1, second, "STOP")
+    assert one.forgotten() is None
+
+
 def test_answer_after_a_restart_is_made_of_the_numbers_shown() -> None:
     def answer(
         taken: Value | None, done: Value = 0, *, failed: Value | None = None, stopped: bool = False, place: str = "a"
