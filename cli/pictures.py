@@ -39,7 +39,7 @@ def drawable(net: Net) -> None:
 
 
 def kept_layout(net: Net, argument: str) -> Arrangement:
-    """What the layout file beside a net says, where there is one; raises `InputError` F1021.
+    """What the layout file beside a net says, where there is one; raises `InputError` as `read_layout` does.
 
     What it arranges and the net does not have is said on standard error.
     """

@@ -49,7 +49,7 @@ CODES: Final[dict[str, str]] = {
     "F1018": "not a file of queries",
     "F1019": "the file has changed since it was read",
     "F1020": "an edit that cannot be made",
-    "F1021": "not a layout file, or not of this net",
+    "F1021": "a layout file that names something twice, or what the net does not have",
     # F2: the net
     "F2001": "duplicate name",
     "F2002": "unknown place",

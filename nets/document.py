@@ -18,7 +18,10 @@ from pydantic_core import PydanticCustomError
 
 from firable.nets.time_limits import TIME_PATTERN
 
-_DIGITS: Final = re.compile(r"0|-?[1-9][0-9]{0,17}")
+DIGITS_MAX: Final = 18
+"""The digits of the longest number."""
+
+_DIGITS: Final = re.compile(rf"0|-?[1-9][0-9]{{0,{DIGITS_MAX - 1}}}")
 
 
 def _as_list(value: object) -> object:

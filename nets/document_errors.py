@@ -3,12 +3,14 @@
 Pydantic reports every error with its path; here each becomes a diagnostic with a code, the place in the text and a
 hint. Wrong indentation is the mistake that makes the most noise: `places:` one level too far left is a controller named
 "places" with unknown keys. So errors below a name that is really a key are joined into one that says so, and so are
-those of all entries that stand in a wrong table, since the line that begins theirs is missing.
+those of all entries that stand in a wrong table, since the line that begins theirs is missing. A slip of the pen makes
+two errors, an unknown key and a missing one: it is said once, at the key as it is written.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+import re
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -21,6 +23,7 @@ from firable.nets.text_positions import bounded
 from firable.nets.yaml_tree import Mapping as MappingNode
 from firable.nets.yaml_tree import Node, Path, Scalar, Sequence, node_span, nodes_along
 
+_QUOTED: Final = re.compile(r"'([^']*)'")
 ERRORS_MAX: Final = 200  # enough to join and to read; a file of noise has millions
 
 
@@ -29,20 +32,30 @@ class Shape:
     """A format of files: its version's key, what such a file is, the keys of each mapping, and what tables hold.
 
     `keys` has the path of every mapping whose keys are not names; `*` stands for a name. `nouns` says of what the names
-    in a table are the names.
+    in a table are the names. `kinds` has the paths of mappings of several kinds, which a key of theirs tells; pydantic
+    puts the kind into its paths, and `keys` has it there too.
     """
 
     version: str
     file: str
     keys: Mapping[tuple[str, ...], tuple[str, ...]]
     nouns: Mapping[str, str]
+    kinds: Collection[tuple[str, ...]] = ()
 
     def keys_at(self, path: Path) -> tuple[str, ...]:
         """The keys of the mapping at a path; none where its keys are names."""
-        for pattern, keys in self.keys.items():
-            if len(pattern) == len(path) and all(p in {"*", step} for p, step in zip(pattern, path, strict=True)):
-                return keys
-        return ()
+        return next((keys for pattern, keys in self.keys.items() if _fits(pattern, path)), ())
+
+    def in_file(self, path: Path) -> Path:
+        """A path of pydantic as the file has it: without the kind of a mapping."""
+        for pattern in self.kinds:
+            if len(path) > len(pattern) and _fits(pattern, path[: len(pattern)]):
+                return (*path[: len(pattern)], *path[len(pattern) + 1 :])
+        return path
+
+
+def _fits(pattern: tuple[str, ...], path: Path) -> bool:
+    return len(pattern) == len(path) and all(p in {"*", step} for p, step in zip(pattern, path, strict=True))
 
 
 def keys_of(model: type[BaseModel]) -> tuple[str, ...]:
@@ -50,24 +63,27 @@ def keys_of(model: type[BaseModel]) -> tuple[str, ...]:
     return tuple(field.alias or name for name, field in model.model_fields.items())
 
 
+_OF_PLACES: Final[tuple[tuple[tuple[str, ...], type[BaseModel]], ...]] = (
+    ((), doc.PlaceDocument),
+    (("send",), doc.CommandDocument),
+    (("within",), doc.WithinDocument),
+    (("task",), doc.TaskUseDocument),
+    (("opens",), doc.ResourceDocument),
+)
+_OF_NET: Final[tuple[tuple[tuple[str, ...], type[BaseModel]], ...]] = (
+    ((), doc.NetDocument),
+    (("controllers", "*"), doc.ControllerDocument),
+    *((("controllers", "*", "places", "*", *key), model) for key, model in _OF_PLACES),
+    *((("places", "*", *key), model) for key, model in _OF_PLACES),
+    (("transitions", "*"), doc.TransitionDocument),
+    (("arbiters", "*"), doc.ArbiterDocument),
+    (("properties", "*"), doc.PropertyDocument),
+    (("properties", "*", "leads_to"), doc.LeadsToDocument),
+)
 NET: Final = Shape(
     "firable",
     "net file",
-    {
-        path: keys_of(model)
-        for path, model in (
-            ((), doc.NetDocument),
-            (("controllers", "*"), doc.ControllerDocument),
-            (("controllers", "*", "places", "*"), doc.PlaceDocument),
-            (("controllers", "*", "places", "*", "within"), doc.WithinDocument),
-            (("places", "*"), doc.PlaceDocument),
-            (("places", "*", "within"), doc.WithinDocument),
-            (("transitions", "*"), doc.TransitionDocument),
-            (("arbiters", "*"), doc.ArbiterDocument),
-            (("properties", "*"), doc.PropertyDocument),
-            (("properties", "*", "leads_to"), doc.LeadsToDocument),
-        )
-    },
+    {path: keys_of(model) for path, model in _OF_NET},
     {
         "controllers": "controller",
         "places": "place",
@@ -105,11 +121,12 @@ def document_problems(
 ) -> list[Diagnostic]:
     """The errors of a validation as diagnostics in the order of the text; what was validated stands `below` a path."""
     problems: dict[tuple[int, int, str], Diagnostic] = {}
-    for one in error.errors(include_url=False, include_input=False)[:ERRORS_MAX]:
-        context = one.get("ctx", {})
-        problem = _problem(source, tree, shape, (*below, *one["loc"]), one["type"], one["msg"], context)
-        span = problem.span
-        if span is not None:
+    errors = error.errors(include_url=False, include_input=False)[:ERRORS_MAX]
+    unknown = {(*below, *one["loc"]) for one in errors if one["type"] == "extra_forbidden"}
+    for one in errors:
+        found = _Error((*below, *one["loc"]), one["type"], one["msg"], one.get("ctx", {}))
+        problem = _problem(source, tree, shape, _of_the_kind(found), unknown)
+        if problem is not None and (span := problem.span) is not None:
             problems.setdefault((span.line, span.column, problem.code), problem)
     return bounded(list(_first_misplaced([problems[key] for key in sorted(problems)])))
 
@@ -123,15 +140,38 @@ def _first_misplaced(problems: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
         seen.add(problem.subject)
 
 
-def _problem(
-    source: Source, tree: Node, shape: Shape, path: Path, kind: str, message: str, context: dict[str, Any]
-) -> Diagnostic:
+@dataclass(frozen=True, slots=True)
+class _Error:
+    """An error of pydantic: where, of which type, what it says of it, and its figures and words."""
+
+    path: Path
+    kind: str
+    message: str
+    context: Mapping[str, Any]
+
+
+def _of_the_kind(error: _Error) -> _Error:
+    """An error about the kind of a mapping as one about the key that tells it."""
+    path = (*error.path, "", str(error.context.get("discriminator", "")).strip("'"))
+    match error.kind:
+        case "union_tag_not_found":
+            return _Error(path, "missing", error.message, error.context)
+        case "union_tag_invalid":
+            return _Error(path, "literal_error", error.message, {"expected": error.context["expected_tags"]})
+        case _:
+            return error
+
+
+def _problem(source: Source, tree: Node, shape: Shape, error: _Error, unknown: Collection[Path]) -> Diagnostic | None:
+    """What an error says; None where the error at one of the `unknown` keys says it."""
+    kind, context = error.kind, error.context
+    path = shape.in_file(error.path)
     if misplaced := _misplaced(source, tree, shape, path, kind) or _of_another_table(source, tree, shape, path):
         return misplaced
+    known = shape.keys_at(error.path[:-1])
     found = list(nodes_along(tree, path))
     key, node = found[-1]
     if kind == "extra_forbidden":
-        known = shape.keys_at(path[:-1])
         hint = f"The keys here are {', '.join(known)}; check the indentation too"
         if isinstance(node, Scalar) and node.plain and not node.text and len(found) > 1:
             hint += ", and write a text with a comma in double quotes"
@@ -143,14 +183,18 @@ def _problem(
         )
     if kind == "missing":
         owner = found[len(path) - 1] if len(found) >= len(path) else found[-1]
+        written = _slip(owner[1], str(path[-1]), known)
+        if written is not None and (*error.path[:-1], written.text) in unknown:
+            return None
+        said = f": {quoted(written.text)} is not it" if written else ""
         return Diagnostic(
             "F1009",
-            f"the key '{path[-1]}' is missing{_inside(path[:-1])}",
-            f"add `{path[-1]}:`",
-            span=node_span(source, owner[0] or owner[1]),
+            f"the key '{path[-1]}' is missing{_inside(path[:-1])}{said}",
+            f"write `{path[-1]}:`" if written else f"add `{path[-1]}:`",
+            span=node_span(source, written or owner[0] or owner[1]),
         )
     if kind in {"refused", "value_error"}:  # what a model says itself; with a hint the first, and the second of others
-        said = str(context.get("error", message)) + _inside(path)
+        said = str(context.get("error", error.message)) + _inside(path)
         return Diagnostic("F1010", said, str(context.get("hint", "")), span=node_span(source, key or node))
     if path[-1:] == ("[key]",):
         return Diagnostic(
@@ -161,6 +205,14 @@ def _problem(
     return Diagnostic(
         "F1010", f"{_found(node)} stands{_where(path)}", _wanted(kind, context, node, path), span=node_span(source, at)
     )
+
+
+def _slip(node: Node, missing: str, known: Collection[str]) -> Scalar | None:
+    """The key of a mapping that was probably meant to be the missing one."""
+    keys = (
+        [key for name, (key, _) in node.entries.items() if name not in known] if isinstance(node, MappingNode) else []
+    )
+    return next((key for key in keys if did_you_mean(key.text, [missing])), None)
 
 
 def _misplaced(source: Source, tree: Node, shape: Shape, path: Path, kind: str) -> Diagnostic | None:
@@ -226,28 +278,47 @@ def _found(node: Node) -> str:
             return "nothing" if plain and not text else quoted(text)
 
 
-def _wanted(kind: str, context: dict[str, Any], node: Node, path: Path) -> str:
-    word = isinstance(node, Scalar) and node.plain and node.text in {"true", "false"}
+def _wanted(kind: str, context: Mapping[str, Any], node: Node, path: Path) -> str:
+    text = node.text if isinstance(node, Scalar) else ""
+    is_word = isinstance(node, Scalar) and node.plain and text in {"true", "false"}
     match kind:
         case "model_type" if path[-1:] == ("leads_to",):
             return "two formulas are expected: `[p, q]`, or `from:` and `to:`"
-        case "string_type" if word and isinstance(node, Scalar):
-            return f'a name or text is expected: write "{node.text}" in double quotes if it is one'
+        case "model_type" if path[-1:] == ("within",):
+            return "a time is expected, such as `5s`, or a mapping with `time: 5s`"
+        case "string_type" if is_word:
+            return f'a name or text is expected: write "{text}" in double quotes if it is one'
         case "string_type" | "string_too_short":
             return "a name or text is expected"
+        case "list_type" if text and not is_word:  # a name for a list of one name is not taken here
+            return "a list is expected: `[name, name]`"
         case "list_type":
             return "a name or a list of names is expected: `name` or `[name, name]`"
-        case "int_type" | "greater_than_equal":
+        case "int_type" if text.isdigit():
+            return f"a whole number of {doc.DIGITS_MAX} digits at most, without a 0 before it, is expected"
+        case "int_type":
             return "a whole number from 0 is expected"
-        case "int_parsing" | "float_parsing" | "greater_than" | "less_than_equal" | "finite_number":
-            bounds = {"gt": "over", "ge": "from", "le": "to"}
-            said = [f" {word} {context[key]:g}" for key, word in bounds.items() if key in context]
-            return f"a {'whole ' if kind == 'int_parsing' else ''}number{''.join(said)} is expected"
+        case "int_parsing" | "float_parsing" | "float_type" | "finite_number":
+            return _number_wanted(kind == "int_parsing", context, path)
+        case "greater_than" | "greater_than_equal" | "less_than_equal":
+            is_whole = any(isinstance(context.get(key), int) for key in ("gt", "ge", "le"))
+            return _number_wanted(is_whole, context, path)
         case "bool_type" | "bool_parsing":
             return "true or false is expected"
-        case "literal_error":
-            return f"{context.get('expected', 'another word')} is expected"
+        case "literal_error" | "enum":
+            expected = str(context.get("expected", "another word"))
+            words = _QUOTED.findall(expected)
+            among = "one of " if len(words) > 2 else ""
+            return f"{did_you_mean(text, words)}{among}{expected} is expected"
         case "too_short" | "too_long":
             return "a list of another length is expected"
         case _:
             return "a mapping, lines of `name: value`, is expected"
+
+
+def _number_wanted(is_whole: bool, context: Mapping[str, Any], path: Path) -> str:
+    bounds = {"gt": "over", "ge": "from", "le": "to"}
+    said = "".join([f" {word} {context[key]:.15g}" for key, word in bounds.items() if key in context])
+    if str(path[-1]).endswith("_s"):
+        return f"a number of seconds{said}, without a unit, is expected"
+    return f"a {'whole ' if is_whole else ''}number{said} is expected"

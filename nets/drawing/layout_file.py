@@ -23,21 +23,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from firable.nets.diagnostics import Diagnostic, InputError, Severity
+from firable.nets.document_errors import Shape, document_problems, keys_of, version_problem
 from firable.nets.drawing.arrangement import Arrangement
 from firable.nets.net import Net
 from firable.nets.source import Source, quoted, read_source
 from firable.nets.yaml_tree import Node, data, node_span, nodes_along, parse_tree, scalars_of, value_of
+from firable.nets.yaml_tree import Path as TreePath
 from firable.nets.yaml_writing import scalar
 
 SIZE_BYTES_MAX: Final = 1024 * 1024
-_ERRORS_MAX: Final = 20
 _NAMES_SAID: Final = 8
-_HINT: Final = "`firable draw NET --keep-layout` writes such a file anew; docs/pictures.md shows one"
+_HINT: Final = (
+    "`firable draw NET --keep-layout` writes such a file anew; docs/pictures.md shows one"
+)
 
 Name = Annotated[str, Field(min_length=1)]
 
@@ -65,6 +68,11 @@ class LayoutModel(_Model):
     rows: list[list[Name]] = []
 
 
+SHAPE: Final = Shape(
+    "firable_layout", "layout file", {(): keys_of(LayoutModel), ("lanes", "*"): keys_of(LaneModel)}, {}
+)
+
+
 def layout_path(net_file: Path | str) -> Path:
     """Where the layout of a net file is kept.
 
@@ -77,7 +85,7 @@ def layout_path(net_file: Path | str) -> Path:
 
 
 def read_layout(path: Path | str) -> Arrangement:
-    """Read a layout file; raises `InputError` F1021, or F1001-F1007 where the file is no YAML."""
+    """Read a layout file; raises `InputError` F1001-F1011 for the text, F1021 for a name that stands twice."""
     return _parse(read_source(path, SIZE_BYTES_MAX))
 
 
@@ -87,22 +95,23 @@ def parse_layout(text: str, file: str = "<layout>") -> Arrangement:
 
 
 def _parse(source: Source) -> Arrangement:
-    tree = parse_tree(source, "layout file", f"`firable_layout: 1`; {_HINT}")
+    tree = parse_tree(source, SHAPE.file, f"`{SHAPE.version}: 1`; {_HINT}")
+    if problem := version_problem(source, tree, SHAPE):
+        raise InputError([problem])
     try:
         model = LayoutModel.model_validate(data(tree))
     except ValidationError as error:
-        found = error.errors(include_url=False, include_input=False)[:_ERRORS_MAX]
-        raise InputError([_problem(source, tree, tuple(one["loc"]), one["msg"]) for one in found]) from None
+        raise InputError(document_problems(source, tree, error, SHAPE)) from None
     if twice := list(_twice(model)):
-        raise InputError([_problem(source, tree, path, f"'{name}' stands here a second time") for path, name in twice])
+        raise InputError([_second(source, tree, path, name) for path, name in twice])
     rows = {name: float(row) for row, names in enumerate(model.rows, start=1) for name in names}
     tracks = {lane.owner: tuple(map(tuple, lane.tracks)) for lane in model.lanes if lane.tracks}
     return Arrangement(tuple(lane.owner for lane in model.lanes), rows, tracks)
 
 
-def _twice(model: LayoutModel) -> Iterator[tuple[tuple[Any, ...], str]]:
+def _twice(model: LayoutModel) -> Iterator[tuple[TreePath, str]]:
     """What stands in a file more than once, with its path."""
-    groups: list[Iterator[tuple[tuple[Any, ...], str]]] = [
+    groups: list[Iterator[tuple[TreePath, str]]] = [
         ((("lanes", i), lane.owner or "nobody's lane") for i, lane in enumerate(model.lanes)),
         ((("rows", i, k), name) for i, row in enumerate(model.rows) for k, name in enumerate(row)),
         (
@@ -120,10 +129,10 @@ def _twice(model: LayoutModel) -> Iterator[tuple[tuple[Any, ...], str]]:
             seen.add(name)
 
 
-def _problem(source: Source, tree: Node, path: tuple[Any, ...], message: str) -> Diagnostic:
+def _second(source: Source, tree: Node, path: TreePath, name: str) -> Diagnostic:
     key, node = list(nodes_along(tree, path))[-1]
-    where = quoted(".".join(map(str, path))) if path else "the file"
-    return Diagnostic("F1021", f"{where}: {message}", _HINT, tuple(map(str, path)), node_span(source, key or node))
+    message = f"{quoted('.'.join(map(str, path)))}: '{name}' stands here a second time"
+    return Diagnostic("F1021", message, _HINT, tuple(map(str, path)), node_span(source, key or node))
 
 
 def vanished(given: Arrangement, net: Net, file: str) -> tuple[Diagnostic, ...]:

@@ -12,23 +12,24 @@ can happen (`firable.nets.machines.closing`). Two keys speak to the second reade
 of machines beside the plant file, with "idle, busy, done" and the sensors that each command sets, says the same things
 a second time and cannot say why two machines collide.
 
-The file is read like a net file: bounded, without ambiguous YAML, each mistake with its line. All mistakes are F5003
-except those of YAML itself.
+The file is read like a net file: bounded, without ambiguous YAML, each mistake with its line. Where it is for other
+machines than a net commands, the file is at fault as well: a plant remembers where in its file everything stands.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from enum import StrEnum
-from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from pathlib import Path as FilePath
+from typing import Annotated, Final, Literal, get_args
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, ValidationError
 
-from firable.nets.diagnostics import Diagnostic, InputError, did_you_mean
+from firable.nets.diagnostics import Diagnostic, InputError, Span, Subject, did_you_mean
+from firable.nets.document_errors import Shape, document_problems, keys_of, version_problem
 from firable.nets.net import Net, SignalKind
 from firable.nets.source import Source, quoted, read_source
-from firable.nets.yaml_tree import Node, data, node_span, nodes_along, parse_tree
+from firable.nets.yaml_tree import Node, Path, Scalar, data, node_span, nodes_along, parse_tree
 
 SIZE_BYTES_MAX: Final = 1024 * 1024
 
@@ -60,14 +61,10 @@ class Failure(StrEnum):
     FOR_GOOD = "for_good"
 
 
-def _failure(value: object) -> object:
-    return Failure(value) if isinstance(value, str) and value in set(Failure) else value
-
-
 class _Timed(_Model):
     takes_s: Seconds
     jitter_s: Seconds = 0.0
-    may_fail: Annotated[Failure | None, BeforeValidator(_failure, json_schema_input_type=Failure | None)] = None
+    may_fail: Annotated[Failure | None, Field(strict=False)] = None
 
 
 class Move(_Timed):
@@ -138,6 +135,7 @@ Action = Annotated[
     Move | Grasp | Put | Carry | Clamp | Process | Release | Work | Stop,
     Field(discriminator="does"),
 ]
+_ACTIONS: Final[tuple[type[BaseModel], ...]] = get_args(get_args(Action)[0])
 
 
 class Machine(_Model):
@@ -191,10 +189,37 @@ class PlantModel(_Model):
     departures: Departures
     machines: dict[Name, Machine]
     sensors: dict[Name, Sensor] = {}
+    _read: tuple[Source, Node] | None = PrivateAttr(default=None)
+
+    def misfit(self, path: Path, subject: Subject, message: str, hint: str) -> Diagnostic:
+        """What does not fit a net (F5003), at the place of the file that a path leads to, as far as it does."""
+        span = _span(*self._read, path) if self._read else None
+        return Diagnostic("F5003", message, hint, subject, span)
 
 
-def read_plant(path: Path | str) -> PlantModel:
-    """Read a plant file; raises `InputError` F5003, or F1001-F1007 where the file is no YAML."""
+_COMMAND: Final = ("machines", "*", "commands", "*")
+SHAPE: Final = Shape(
+    "firable_plant",
+    "plant file",
+    {
+        path: keys_of(model)
+        for path, model in (
+            ((), PlantModel),
+            (("arrivals",), Arrivals),
+            (("departures",), Departures),
+            (("machines", "*"), Machine),
+            (("sensors", "*"), Sensor),
+        )
+    }
+    | {(*_COMMAND, *get_args(action.model_fields["does"].annotation)): keys_of(action) for action in _ACTIONS}
+    | {_COMMAND: tuple(dict.fromkeys(key for action in _ACTIONS for key in keys_of(action)))},
+    {"machines": "machine", "positions": "position", "commands": "command", "sensors": "sensor"},
+    (_COMMAND,),
+)
+
+
+def read_plant(path: FilePath | str) -> PlantModel:
+    """Read a plant file; raises `InputError` F1001-F1011 for the text, F5003 where it contradicts itself."""
     return _parse(read_source(path, SIZE_BYTES_MAX))
 
 
@@ -204,31 +229,42 @@ def parse_plant(text: str, file: str = "<plant>") -> PlantModel:
 
 
 def _parse(source: Source) -> PlantModel:
-    tree = parse_tree(source, "plant file", "`firable_plant: 1` and `plant: NAME`; docs/machines.md describes it")
+    tree = parse_tree(source, SHAPE.file, f"`{SHAPE.version}: 1` and `plant: NAME`; docs/machines.md describes it")
+    if problem := version_problem(source, tree, SHAPE):
+        raise InputError([problem])
     try:
         model = PlantModel.model_validate(data(tree))
     except ValidationError as error:
-        found = error.errors(include_url=False, include_input=False)
-        raise InputError([_problem(source, tree, tuple(one["loc"]), one["msg"]) for one in found[:20]]) from None
-    problems = [_problem(source, tree, path, message, hint) for path, message, hint in _inconsistencies(model)]
+        raise InputError(document_problems(source, tree, error, SHAPE)) from None
+    problems = [
+        Diagnostic(
+            "F5003",
+            f"{quoted('.'.join(map(str, path)))}: {message}",
+            hint,
+            tuple(map(str, path)),
+            _span(source, tree, path),
+        )
+        for path, message, hint in _inconsistencies(model)
+    ]
     if problems:
         raise InputError(problems)
+    model._read = (source, tree)
     return model
 
 
-def _problem(source: Source, tree: Node, path: tuple[Any, ...], message: str, hint: str = "") -> Diagnostic:
-    # pydantic puts the chosen alternative of `does` into the path; it is no key of the file.
-    steps = [step for i, step in enumerate(path) if not (i == 4 and path[0] == "machines" and path[2] == "commands")]
-    key, node = list(nodes_along(tree, tuple(steps)))[-1]
-    where = quoted(".".join(map(str, steps))) if steps else "the file"
-    hint = hint or "the format is described in docs/machines.md and by the plants of the catalogue"
-    return Diagnostic("F5003", f"{where}: {message}", hint, tuple(map(str, steps)), node_span(source, key or node))
+def _span(source: Source, tree: Node, path: Path) -> Span:
+    """Where a path of a file ends, as far as it leads: at a value of one word, else at the key."""
+    key, node = list(nodes_along(tree, path))[-1]
+    return node_span(source, node if isinstance(node, Scalar) and node.text else key or node)
 
 
-def _inconsistencies(model: PlantModel) -> Iterator[tuple[tuple[str, ...], str, str]]:
+def _inconsistencies(model: PlantModel) -> Iterator[tuple[Path, str, str]]:
     stations = set(model.stations)
+    for i, name in enumerate(model.stations):
+        if name in model.stations[:i]:
+            yield ("stations", i), f"the station '{name}' stands here a second time", "write it once, or rename one"
 
-    def station(path: tuple[str, ...], name: str | None) -> Iterator[tuple[tuple[str, ...], str, str]]:
+    def station(path: Path, name: str | None) -> Iterator[tuple[Path, str, str]]:
         if name is not None and name not in stations:
             yield path, f"there is no station '{name}'", did_you_mean(name, model.stations) + "see `stations`"
 
@@ -272,46 +308,53 @@ def _inconsistencies(model: PlantModel) -> Iterator[tuple[tuple[str, ...], str, 
 
 def misfits(model: PlantModel, net: Net) -> tuple[Diagnostic, ...]:
     """Where a plant does not fit a net (F5003): a command it does not know, a sensor on one side only."""
-    problems = []
+    return (*_misfits_of_places(model, net), *_misfits_of_signals(model, net))
+
+
+def _misfits_of_places(model: PlantModel, net: Net) -> Iterator[Diagnostic]:
     for place in net.places:
-        command = place.command
+        command, subject = place.command, ("places", place.name)
         if command is None:
             continue
+        sent = f"'{place.name}' sends '{command}'"
         known = model.machines.get(command.machine)
-        if known is None or command.command not in known.commands:
-            lacking = f"machine '{command.machine}'" if known is None else f"command '{command.command}'"
-            message = f"'{place.name}' sends '{command}', and the plant has no such {lacking}"
-            problems.append(Diagnostic("F5003", message, "add it to the plant file", ("places", place.name)))
+        if known is None:
+            hint = did_you_mean(command.machine, list(model.machines)) + "add it to the plant file"
+            message = f"{sent}, and the plant has no such machine '{command.machine}'"
+            yield model.misfit(("machines",), subject, message, hint)
+            continue
+        inner = ("machines", command.machine, "commands", command.command)
+        if command.command not in known.commands:
+            hint = did_you_mean(command.command, list(known.commands)) + "add it to the plant file"
+            yield model.misfit(inner, subject, f"{sent}, and the plant has no such command '{command.command}'", hint)
             continue
         action, parameters = known.commands[command.command], dict(command.parameters)
         needed = {"move": "to", "grasp": "at", "put": "at"}.get(action.does)
         if needed and parameters.get(needed) not in known.positions:
-            message = f"'{place.name}' sends '{command}': '{needed}' is no position of '{command.machine}'"
+            message = f"{sent}: '{needed}' is no position of '{command.machine}'"
             hint = f"its positions are {', '.join(known.positions)}"
-            problems.append(Diagnostic("F5003", message, hint, ("places", place.name)))
+            yield model.misfit(("machines", command.machine, "positions"), subject, message, hint)
         if place.completion and isinstance(action, Stop):
             message = f"'{place.name}' waits for the completion of '{command}', which only stops"
-            problems.append(Diagnostic("F5003", message, "leave out `until`", ("places", place.name)))
+            yield model.misfit(inner, subject, message, "leave out `until`")
+
+
+def _misfits_of_signals(model: PlantModel, net: Net) -> Iterator[Diagnostic]:
     for signal in net.signals:
         if signal.kind is SignalKind.SENSOR and signal.name not in model.sensors:
             hint = did_you_mean(signal.name, list(model.sensors)) + "add it to the `sensors` of the plant file"
-            problems.append(
-                Diagnostic("F5003", f"no sensor of the plant drives '{signal.name}'", hint, ("signals", signal.name))
-            )
+            message = f"no sensor of the plant drives '{signal.name}'"
+            yield model.misfit(("sensors",), ("signals", signal.name), message, hint)
     for name, sensor in model.sensors.items():
-        if name in net.signal_index and net.signal(name).kind is SignalKind.TIMER:
-            hint = "a timer is set by its controller: rename the sensor"
-            problems.append(Diagnostic("F5003", f"'{name}' is a timer of the net", hint, ("sensors", name)))
-        if (
-            sensor.acknowledges is not None
-            and name in net.signal_index
-            and net.signal(name).kind is SignalKind.COMPLETION
-        ):
-            hint = "declare it under `inputs`, and write it as `if` of a transition"
-            problems.append(
-                Diagnostic("F5003", f"the key '{name}' is a completion of the net", hint, ("sensors", name))
-            )
+        at = ("sensors", name)
         if name not in net.signal_index:
             hint = did_you_mean(name, [signal.name for signal in net.signals]) + "sensors bear the names of signals"
-            problems.append(Diagnostic("F5003", f"the net has no signal '{name}'", hint, ("sensors", name)))
-    return tuple(problems)
+            yield model.misfit(at, at, f"the net has no signal '{name}'", hint)
+            continue
+        kind = net.signal(name).kind
+        if kind is SignalKind.TIMER:
+            hint = "a timer is set by its controller: rename the sensor"
+            yield model.misfit(at, at, f"'{name}' is a timer of the net", hint)
+        if sensor.acknowledges is not None and kind is SignalKind.COMPLETION:
+            hint = "declare it under `inputs`, and write it as `if` of a transition"
+            yield model.misfit(at, at, f"the key '{name}' is a completion of the net", hint)

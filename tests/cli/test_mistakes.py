@@ -2,6 +2,7 @@
 
 import os
 import pty
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -222,6 +223,13 @@ def test_a_plant_that_does_not_fit_is_refused(tmp_path: Path, capsys: pytest.Cap
     bundle = str(tmp_path / "cell.bundle")
     assert main(["bundle", "catalogue:one_robot", "-o", bundle]) == 0
     assert "error[F5003]" in refused(capsys, "run", bundle, "--plant", "catalogue:two_robots_shared")
+    plant = tmp_path / "x.plant.yaml"
+    text = catalogue_path("one_robot").with_name("one_robot.plant.yaml").read_text("utf-8")
+    plant.write_text(text.replace("part_present", "prt_present"))
+    for arguments in (("run", bundle, "--plant"), ("check", "catalogue:one_robot", "--machines")):
+        said = refused(capsys, *arguments, str(plant))
+        assert f"{plant}:1:1" not in said
+        assert re.search(rf"{plant}:\d+:3: error\[F5003\]: the net has no signal 'mc.prt_present'", said)
     assert "error[F1001]" in refused(capsys, "run", bundle, "--plant", str(tmp_path / "no.plant.yaml"))
     said = refused(capsys, "run", bundle, "--workpieces", "1", "--trace", str(tmp_path / "no" / "trace"))
     assert "error[F1017]" in said

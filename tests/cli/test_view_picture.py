@@ -115,9 +115,9 @@ def test_a_layout_or_task_that_is_none_is_refused_before_anything_is_served(
     net.write_text(BELT)
     assert main(["view", str(net), "--collapse", "robto", "--no-browser"]) == 2
     assert "no place and no controller 'robto'; did you mean 'robot'" in capsys.readouterr().err
-    (tmp_path / "cell.layout.yaml").write_text("lanes: 3\n")
+    (tmp_path / "cell.layout.yaml").write_text("firable_layout: 1\nlanes: 3\n")
     assert main(["view", str(net), "--no-browser"]) == 2
-    assert "error[F1021]" in capsys.readouterr().err
+    assert "error[F1010]" in capsys.readouterr().err
 
 
 def test_pictures_are_drawn_once_and_the_last_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -171,9 +171,9 @@ def test_the_page_of_a_run_follows_the_layout_beside_its_bundle_and_a_wrong_one_
     kept.write_text("firable_layout: 1\nlanes: [{owner: mc}, {owner: robot}, {owner: gone}]\n")
     assert picture() != free
     assert "warning[F1021]" in capsys.readouterr().err
-    kept.write_text("lanes: 3\n")
+    kept.write_text("firable_layout: 1\nlanes: 3\n")
     assert picture() == free
-    assert "warning[F1021]" in capsys.readouterr().err
+    assert "warning[F1010]" in capsys.readouterr().err
 
 
 @needs_browser

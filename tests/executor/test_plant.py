@@ -256,10 +256,16 @@ def test_plant_of_another_cell_does_not_fit() -> None:
 
 def test_position_or_sensor_that_the_plant_lacks_is_a_misfit() -> None:
     text = plant_path("one_robot").read_text("utf-8")
-    lacking = parse_plant(
-        text.replace("CV2: cv2_entry", "CV3: cv2_entry").replace("mc.part_present", "mc.part_presence")
-    )
-    codes = {(problem.code, problem.subject) for problem in misfits(lacking, catalogue_net("one_robot"))}
+    lacking_text = text.replace("CV2: cv2_entry", "CV3: cv2_entry").replace("mc.part_present", "mc.part_presence")
+    lacking = parse_plant(lacking_text)
+    found = misfits(lacking, catalogue_net("one_robot"))
+    lines = lacking_text.splitlines()
+    assert {lines[problem.span.line - 1].split(":")[0].strip() for problem in found if problem.span} == {
+        "positions",
+        "sensors",
+        "mc.part_presence",
+    }
+    codes = {(problem.code, problem.subject) for problem in found}
     assert codes == {
         ("F5003", ("places", "robot.to_cv2")),
         ("F5003", ("places", "robot.put_cv2")),
@@ -268,24 +274,36 @@ def test_position_or_sensor_that_the_plant_lacks_is_a_misfit() -> None:
     }
 
 
+def test_machine_or_command_that_the_plant_lacks_is_said_at_the_table_to_add_it_to() -> None:
+    text = plant_path("one_robot").read_text("utf-8")
+    net = catalogue_net("one_robot")
+    for old, new, at, words in (
+        ("\n  MC:", "\n  MCC:", "machines", "did you mean 'MCC'? add it to the plant file"),
+        ("      MOVE:", "      MOVEE:", "commands", "did you mean 'MOVEE'? add it to the plant file"),
+    ):
+        assert old in text
+        lacking = text.replace(old, new)
+        problem = misfits(parse_plant(lacking), net)[0]
+        assert problem.span is not None
+        assert lacking.splitlines()[problem.span.line - 1].strip() == f"{at}:"
+        assert words in problem.hint
+
+
 @pytest.mark.parametrize(
     ("old", "new", "line", "message"),
     [
-        ("takes_s: 4}", "takes_s: soon}", 22, "'machines.B.commands.RUN.takes_s': Input should be a valid number"),
-        ("takes_s: 4}", "takes_s: nan}", 22, "'machines.B.commands.RUN.takes_s': Input should be"),
-        ("takes_s: 4}", "takes_s: -1}", 22, "'machines.B.commands.RUN.takes_s': Input should be greater"),
-        ("does: stop", "does: halt", 23, "'machines.B.commands.STOP': Input tag 'halt'"),
         ("hand: HOME", "hand: MOON", 8, "there is no position 'MOON'"),
         ("to: table", "to: tabel", 22, "there is no station 'tabel'"),
         ("{station: exit,", "{station: exits,", 5, "there is no station 'exits'"),
         ("    hand: HOME\n", "", 10, "'R' has no hand"),
         ("{holding: R}", "{holding: Q}", 26, "there is no machine 'Q'"),
         ("{holding: R}", "{}", 26, "a sensor sees one thing"),
-        ("plant: bench", "plant: bench\ncolour: red", 3, "'colour': Extra inputs are not permitted"),
-        ("firable_plant: 1", "firable_plant: 2", 1, "'firable_plant': Input should be 1"),
+        ("[entry, table, exit]", "[entry, table, exit, table]", 3, "'table' stands here a second time"),
     ],
 )
-def test_mistake_in_a_plant_file_is_refused_with_its_line(old: str, new: str, line: int, message: str) -> None:
+def test_plant_file_that_contradicts_itself_is_refused_with_its_line(
+    old: str, new: str, line: int, message: str
+) -> None:
     assert old in TEXT
     with pytest.raises(InputError) as refusal:
         parse_plant(TEXT.replace(old, new, 1))
@@ -297,7 +315,39 @@ def test_mistake_in_a_plant_file_is_refused_with_its_line(old: str, new: str, li
     assert problem.hint
 
 
-@pytest.mark.parametrize(("text", "code"), [("", "F1002"), ("- a", "F5003"), ("x", "F5003"), ("a: 1\na: 2", "F1006")])
+@pytest.mark.parametrize(
+    ("old", "new", "code", "at", "words"),
+    [
+        ("takes_s: 4}", "takes_s: 4s}", "F1010", "4s", "a number of seconds, without a unit, is expected"),
+        ("takes_s: 4}", "takes_s: .inf}", "F1010", ".inf", "a number of seconds, without a unit, is expected"),
+        ("takes_s: 4}", "takes_s: nan}", "F1010", "nan", "a number of seconds"),
+        ("takes_s: 4}", "takes_s: -1}", "F1010", "-1", "a number of seconds from 0, without a unit, is expected"),
+        ("takes_s: 4}", "take_s: 4}", "F1008", "take_s", "did you mean 'takes_s'? The keys here are"),
+        ("takes_s: 4}", "takes_s: 4, may_fail: often}", "F1010", "often", "'repairable' or 'for_good' is expected"),
+        ("does: stop", "does: stpo", "F1010", "stpo", "did you mean 'stop'? one of 'move', 'grasp'"),
+        ("does: stop", "dose: stop", "F1009", "dose", "the key 'does' is missing in 'machines.B.commands.STOP'"),
+        ("{does: stop}", "{}", "F1009", "STOP", "add `does:`"),
+        ("does: stop", "does: stop, takes_s: 1", "F1008", "takes_s", "The keys here are does;"),
+        ("{does: stop}", "\n      does: stop", "F1010", "STOP", "a mapping, lines of `name: value`"),
+        ("plant: bench", "plant: bench\ncolour: red", "F1008", "colour", "unknown key 'colour'"),
+        ("firable_plant: 1", "firable_plant: 2", "F1011", "2", "write `firable_plant: 1`"),
+    ],
+)
+def test_word_that_a_plant_file_does_not_have_is_refused_where_it_stands(
+    old: str, new: str, code: str, at: str, words: str
+) -> None:
+    assert old in TEXT
+    with pytest.raises(InputError) as refusal:
+        parse_plant(TEXT.replace(old, new, 1))
+    problem = refusal.value.diagnostics[0]
+    assert problem.code == code
+    assert words in f"{problem.message}\n{problem.hint}"
+    assert problem.span is not None
+    assert problem.span.excerpt[problem.span.column - 1 :][: problem.span.length] == at
+    assert len(refusal.value.diagnostics) == (2 if "\n      does" in new else 1)
+
+
+@pytest.mark.parametrize(("text", "code"), [("", "F1002"), ("- a", "F1010"), ("x", "F1010"), ("a: 1\na: 2", "F1006")])
 def test_file_that_is_no_plant_is_refused(text: str, code: str, tmp_path: Path) -> None:
     path = tmp_path / "x.plant.yaml"
     path.write_text(text, "utf-8")

@@ -111,21 +111,23 @@ def test_names_that_have_vanished_are_said() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "words", "line"),
+    ("text", "code", "words", "line"),
     [
-        ("firable_layout: 2\n", "Input should be 1", 1),
-        ("firable_layout: 1\nrow: []\n", "Extra inputs are not permitted", 2),
-        ("firable_layout: 1\nrows:\n- [G1]\n- [G2, G1]\n", "'G1' stands here a second time", 4),
-        ("firable_layout: 1\nlanes:\n- owner: a\n- owner: a\n", "'a' stands here a second time", 4),
-        ("firable_layout: 1\nrows: G1\n", "should be a valid list", 2),
+        ("firable_layout: 2\n", "F1011", "write `firable_layout: 1`", 1),
+        ("rows: []\n", "F1009", "the key 'firable_layout' is missing", 1),
+        ("firable_layout: 1\nlnes: []\n", "F1008", "unknown key 'lnes'\nlnes: []\ndid you mean 'lanes'?", 2),
+        ("firable_layout: 1\nlanes: [{track: []}]\n", "F1008", "did you mean 'tracks'?", 2),
+        ("firable_layout: 1\nrows:\n- [G1]\n- [G2, G1]\n", "F1021", "'G1' stands here a second time", 4),
+        ("firable_layout: 1\nlanes:\n- owner: a\n- owner: a\n", "F1021", "'a' stands here a second time", 4),
+        ("firable_layout: 1\nrows: G1\n", "F1010", "a list is expected: `[name, name]`", 2),
     ],
 )
-def test_a_bad_layout_file_is_refused_with_its_place(text: str, words: str, line: int) -> None:
+def test_a_bad_layout_file_is_refused_with_its_place(text: str, code: str, words: str, line: int) -> None:
     with pytest.raises(InputError) as refused:
         parse_layout(text)
     (found,) = refused.value.diagnostics
-    assert found.code == "F1021"
-    assert words in found.message
+    assert found.code == code
+    assert words in f"{found.message}\n{found.span and found.span.excerpt}\n{found.hint}"
     assert found.span is not None
     assert found.span.line == line
 
@@ -147,7 +149,7 @@ def test_a_layout_is_kept_beside_the_net_and_read_the_next_time(
     assert "the transition 'lost'" in done.err
     beside.write_text("- broken\n")
     assert main(["draw", str(file), "-o", str(tmp_path / "x.svg")]) == 2
-    assert "error[F1021]" in capsys.readouterr().err
+    assert "error[F1010]" in capsys.readouterr().err
     assert not (tmp_path / "x.svg").exists()
     assert main(["draw", "catalogue:one_robot", "--keep-layout", "-o", str(tmp_path / "x.svg")]) == 2
     assert "a net of the catalogue has none" in capsys.readouterr().err

@@ -96,7 +96,7 @@ def test_a_fault_place_that_nobody_declared_is_not_printed() -> None:
         ("{time: 5s, to: go}", [("F2009", "go"), ("F2002", "robot.go_fault")]),
         ("{time: 5s, timer: reset}", [("F2001", "reset")]),
         ("{time: 5s, transition: end}", [("F2001", "end")]),
-        ("{tim: 5s}", [("F1009", "within"), ("F1008", "tim")]),
+        ("{tim: 5s}", [("F1008", "tim")]),
         ("[5s]", [("F1010", "[")]),
     ],
 )  # fmt: skip
