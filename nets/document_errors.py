@@ -223,8 +223,8 @@ def _misplaced(source: Source, tree: Node, shape: Shape, path: Path, kind: str) 
         outer, inner = shape.keys_at(path[: length - 2]), shape.keys_at(path[:length])
         if path[length - 2] not in shape.nouns or not inner or name not in {*outer, *inner}:
             continue
-        key = list(nodes_along(tree, path[:length]))[-1][0]
-        if key is not None:
+        key, entry = list(nodes_along(tree, path[:length]))[-1]
+        if key is not None and not _means(entry, inner):
             noun = shape.nouns[str(path[length - 2])]
             return Diagnostic(
                 "F1008",
@@ -234,6 +234,11 @@ def _misplaced(source: Source, tree: Node, shape: Shape, path: Path, kind: str) 
                 span=node_span(source, key),
             )
     return None
+
+
+def _means(entry: Node, keys: tuple[str, ...]) -> bool:
+    """Whether each key of an entry is one of these, or a slip of the pen: then its name is a name."""
+    return isinstance(entry, MappingNode) and all(key in keys or did_you_mean(key, keys) for key in entry.entries)
 
 
 def _of_another_table(source: Source, tree: Node, shape: Shape, path: Path) -> Diagnostic | None:

@@ -81,6 +81,8 @@ TABLE = (
     net("unknown key", "contollers: {}\n", "F1008 3:1", "did you mean 'controllers'?"),
     net("unknown key in a place", "places: {p: {sned: x}}\n", "F1008 3:14", "did you mean 'send'?"),
     net("unknown key in a transition", T + "  t: {form: p}\n", "F1008 4:7", "did you mean 'from'?"),
+    net("unknown key in a transition that has the name of a key", T + "  start: {form: p, to: q}\n", "F1008 4:11",
+        "did you mean 'from'?"),
     net("required key misspelt", "arbiters: {a: {amnog: [t, u]}}\n", "F1008 3:16", "did you mean 'among'?"),
     net("comma without quotes", "places: {p: {description: a, b}}\n", "F1008 3:30", "The keys here are send"),
     net("places beside the controllers", "controllers:\n  robot:\n  places:\n    p:\n    q:\n", "F1008 5:3",
