@@ -39,7 +39,7 @@ from firable.nets.yaml_writing import scalar
 SIZE_BYTES_MAX: Final = 1024 * 1024
 _NAMES_SAID: Final = 8
 _HINT: Final = (
-    "`firable draw NET --keep-layout` writes such a file anew; docs/pictures.md shows one"
+    "mend it, or delete it and have `firable draw NET --keep-layout` write it anew; docs/pictures.md shows one"
 )
 
 Name = Annotated[str, Field(min_length=1)]

@@ -151,5 +151,13 @@ def test_a_layout_is_kept_beside_the_net_and_read_the_next_time(
     assert main(["draw", str(file), "-o", str(tmp_path / "x.svg")]) == 2
     assert "error[F1010]" in capsys.readouterr().err
     assert not (tmp_path / "x.svg").exists()
+    for bad in ("# nothing\n", "firable_layout: 1\nrows:\n- [bring, bring]\n"):
+        beside.write_text(bad)
+        assert main(["draw", str(file), "--keep-layout", "-o", str(tmp_path / "x.svg")]) == 2
+        assert "delete it and have `firable draw NET --keep-layout` write it anew" in capsys.readouterr().err
+        assert beside.read_text() == bad, "what a person wrote is not overwritten"
+    beside.unlink()
+    assert main(["draw", str(file), "--keep-layout", "-o", str(tmp_path / "x.svg")]) == 0
+    assert beside.exists()
     assert main(["draw", "catalogue:one_robot", "--keep-layout", "-o", str(tmp_path / "x.svg")]) == 2
     assert "a net of the catalogue has none" in capsys.readouterr().err
