@@ -25,6 +25,7 @@ from firable.cli.report import Report
 if TYPE_CHECKING:
     from firable.analysis.spaces.reachability import Budget
     from firable.decompose.refinement.sealing import Origin
+    from firable.nets.verdict import Verdict
 
 
 @click.command(short_help="Check and prove a net, and seal it in a bundle that may run.")
@@ -66,12 +67,12 @@ def bundle(
     if output == "-":
         raise click.UsageError("a bundle cannot go to standard output, where the report goes: name a file")
     more: dict[str, Any] = {"protocol": protocol, "faults": faults}
-    if machines is not None:
-        more["plant"] = plant_text(machines)
     if files and conceptual is None:
         raise click.UsageError("--tasks goes with --conceptual, whose places name tasks")
     made_of = None if conceptual is None else (conceptual, files)
-    return answer("bundle", format_, with_page(lambda: _report(net, output, limits, more, made_of), page), _show)
+    return answer(
+        "bundle", format_, with_page(lambda: _report(net, output, limits, more, machines, made_of), page), _show
+    )
 
 
 def _origin(conceptual: str, files: tuple[str, ...], allowed: Budget) -> Origin:
@@ -87,43 +88,59 @@ def _report(
     output: str,
     limits: dict[str, Any],
     more: dict[str, Any],
+    machines: str | None,
     made_of: tuple[str, tuple[str, ...]] | None,
 ) -> Report:
     from firable.analysis.check import check
     from firable.analysis.deadline import Deadline
     from firable.analysis.goal import Limits
-    from firable.decompose.bundling import SECONDS, make_bundle
+    from firable.decompose.bundling import SECONDS, UnbundledError, make_bundle
     from firable.nets.bundle import write_bundle
     from firable.nets.verdict import Status, overall
 
     loaded = load_net(argument)
     net, allowed = loaded.net, budget(**limits)
+    if machines is not None:
+        more["plant"] = plant_text(machines, net)
     if made_of is not None:
         more["origin"] = _origin(*made_of, allowed)
     with loaded.placing():
         found = check(net, budget=allowed)
-    if overall(found.verdicts) is not Status.PROVED:
-        figures = found.figures.to_json()
-        return Report(
-            "bundle", argument, net, found.verdicts, figures=figures, notes=loaded.notes, positions=loaded.positions
-        )
+    figures = found.figures.to_json()
+    unmade = Report(
+        "bundle", argument, net, found.verdicts, figures=figures, notes=loaded.notes, positions=loaded.positions
+    )
+    if overall(unmade.verdicts) is not Status.PROVED:
+        return unmade
     seconds = SECONDS if allowed.seconds is None else allowed.seconds
-    with loaded.placing():
-        made = make_bundle(found, Limits(Deadline.after(seconds), allowed.memory_bytes), **more)
-    write_bundle(output, made)
     told = {verdict.name: verdict for verdict in found.verdicts}  # with all that the bundle has no evidence on
-    return Report(
-        "bundle",
-        argument,
-        net,
-        tuple(replace(told.get(one.name, one), evidence=one.evidence) for one in made.verdicts),
-        figures={**found.figures.to_json(), "bundle_digest": made.digest},
-        notes=loaded.notes,
+    with loaded.placing():
+        try:
+            made = make_bundle(found, Limits(Deadline.after(seconds), allowed.memory_bytes), **more)
+        except UnbundledError as refusal:
+            verdicts = tuple(told.get(one.name) or _without_run(one) for one in refusal.verdicts)
+            if overall(verdicts) is Status.PROVED:  # what is lacking is evidence
+                raise
+            return replace(unmade, verdicts=verdicts)
+    write_bundle(output, made)
+    return replace(
+        unmade,
+        verdicts=tuple(replace(told.get(one.name, one), evidence=one.evidence) for one in made.verdicts),
+        figures={**figures, "bundle_digest": made.digest},
         table=made.decomposition.table,
         decomposition=made.decomposition,
         files=(output,),
-        positions=loaded.positions,
     )
+
+
+def _without_run(verdict: Verdict) -> Verdict:
+    """A verdict on one of the loops with machines, told without its run: it is of a net that is not shown here."""
+    from firable.decompose.bundling import shown_by
+    from firable.decompose.proofs.closed_loops import PREFIXES
+
+    if verdict.witness is None or not verdict.name.startswith(PREFIXES):
+        return verdict
+    return replace(verdict, witness=None, hint="; ".join(filter(None, (verdict.hint, shown_by(verdict.name)))))
 
 
 def _show(report: Report) -> None:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from firable.analysis.loop.verdicts import Difference
     from firable.analysis.spaces.reachability import Budget
     from firable.nets.machines.plant_file import PlantModel
+    from firable.nets.net import Net
 
 machines_option = click.option(
     "--machines",
@@ -42,13 +43,15 @@ def read_machines(argument: str) -> PlantModel:
     return read_plant(file)
 
 
-def plant_text(argument: str) -> str:
-    """The text of the plant file that an argument names, after it has been read without a mistake."""
-    from firable.nets.machines.plant_file import SIZE_BYTES_MAX, parse_plant
+def plant_text(argument: str, net: Net) -> str:
+    """The text of the plant file that an argument names, after it was read without a mistake and fits the net."""
+    from firable.nets.diagnostics import InputError
+    from firable.nets.machines.plant_file import SIZE_BYTES_MAX, misfits, parse_plant
     from firable.nets.source import read_source
 
     source = read_source(_plant_file(argument), SIZE_BYTES_MAX)
-    parse_plant(source.text, source.file)
+    if problems := misfits(parse_plant(source.text, source.file), net):
+        raise InputError(problems)
     return source.text
 
 

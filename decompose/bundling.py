@@ -11,7 +11,7 @@ on all of it goes along, so that the bundle can be checked again without anythin
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -46,6 +46,14 @@ METHOD: Final = "shown by its evidence"
 LATE: Final = "the time for evidence was over"
 
 
+class UnbundledError(InputError):
+    """Why a bundle may not be made (F4003), with the verdicts that were to be in it."""
+
+    def __init__(self, diagnostics: Iterable[Diagnostic], verdicts: tuple[Verdict, ...]) -> None:
+        super().__init__(diagnostics)
+        self.verdicts = verdicts
+
+
 def make_bundle(
     report: CheckReport,
     limits: Limits | None = None,
@@ -66,8 +74,8 @@ def make_bundle(
     the conceptual net and the tasks of which the net is made, and that it does what that one does.
 
     Raises `InputError`: F4001 and F2011 where the net cannot be split; F4003 where the report is not that of exploring
-    this net by interleaving, which is how it will be executed, and for everything that must be proved and is not, or
-    is not shown, and where the net is not made of its origin.
+    this net by interleaving, which is how it will be executed, and where the net is not made of its origin. For all
+    that must be proved and is not, or is not shown, it is an `UnbundledError` (F4003).
     """
     if report.net != report.space.net:
         message = f"the verdicts are on another net than '{report.net.name}'"
@@ -103,7 +111,7 @@ def make_bundle(
     if problems := (*unproved(bundle), *_given_up(proof)):
         lacking = {record.name: record.lacking for record in document.records if record.proved and record.lacking}
         lacking |= {verdict.name: LATE for verdict in held if verdict.holds and not verdict.evidence}
-        raise InputError(_unbundled(problem, lacking) for problem in problems)
+        raise UnbundledError((_unbundled(problem, lacking) for problem in problems), verdicts)
     return bundle
 
 
@@ -150,13 +158,16 @@ def _given_up(proof: ProofReport) -> Iterator[Diagnostic]:
             yield Diagnostic("F5002", message, verdict.hint, ("verdicts", verdict.name))
 
 
+def shown_by(name: str) -> str:
+    """Where one sees the run that refutes a verdict on a closed loop."""
+    return f"`firable {'prove' if name.startswith('o4.') else 'check'} NET --machines PLANT` shows the run"
+
+
 def _unbundled(problem: Diagnostic, lacking: Mapping[str, str]) -> Diagnostic:
     """What keeps a bundle from running, said to who makes it."""
     name = problem.subject[-1]
     if name.startswith(PREFIXES) and name not in lacking:
-        command = "prove" if name.startswith("o4.") else "check"
-        hint = f"{problem.hint}; `firable {command} NET --machines PLANT` shows the run"
-        return replace(problem, code="F4003", hint=hint)
+        return replace(problem, code="F4003", hint=f"{problem.hint}; {shown_by(name)}")
     if name not in lacking:
         return replace(problem, code="F4003")
     message = f"'{name}' is proved, and there is no evidence that shows it again: {lacking[name]}"

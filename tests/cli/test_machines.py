@@ -145,6 +145,25 @@ def test_what_does_not_go_together_is_refused(
     assert message in captured.err + captured.out
 
 
+def test_a_bundle_that_the_machines_forbid_ends_with_a_report_of_what_is_violated(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As one does that the net alone forbids."""
+    plant = tmp_path / "flickering.plant.yaml"
+    text = catalogue_path("one_robot").with_name("one_robot.plant.yaml").read_text("utf-8")
+    plant.write_text(text.replace("{occupied: mc_table}", "{occupied: mc_table, may_flicker: true}"))
+    bundle = tmp_path / "cell.bundle"
+    assert main(["bundle", CELL, "-o", str(bundle), "--machines", str(plant)]) == 1
+    told = capsys.readouterr()
+    assert "✗ violated  o4.G4.mc.part_present" in told.out
+    assert "`firable prove NET --machines PLANT` shows the run" in told.out
+    assert "`firable check NET --machines PLANT` shows the run" in told.out
+    assert "violated: 2 violated" in told.out
+    assert "no bundle was made" in told.out
+    assert told.err == ""
+    assert not bundle.exists()
+
+
 def test_prove_asks_the_assumptions_of_the_machines(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["prove", CELL, "--machines", PLANT]) == 0
     told = capsys.readouterr().out

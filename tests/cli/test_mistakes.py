@@ -226,7 +226,12 @@ def test_a_plant_that_does_not_fit_is_refused(tmp_path: Path, capsys: pytest.Cap
     plant = tmp_path / "x.plant.yaml"
     text = catalogue_path("one_robot").with_name("one_robot.plant.yaml").read_text("utf-8")
     plant.write_text(text.replace("part_present", "prt_present"))
-    for arguments in (("run", bundle, "--plant"), ("check", "catalogue:one_robot", "--machines")):
+    cell = "catalogue:one_robot"
+    for arguments in (
+        ("run", bundle, "--plant"),
+        ("check", cell, "--machines"),
+        ("bundle", cell, "-o", str(tmp_path / "x"), "--machines"),
+    ):
         said = refused(capsys, *arguments, str(plant))
         assert f"{plant}:1:1" not in said
         assert re.search(rf"{plant}:\d+:3: error\[F5003\]: the net has no signal 'mc.prt_present'", said)
