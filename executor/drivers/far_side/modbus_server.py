@@ -119,7 +119,10 @@ class ModbusTcpEnd(ModbusServer):
             return
         devices = [one.device(unit) for unit, one in self.units.items()] or self.device()
         self.server = ModbusTcpServer(devices, address=("127.0.0.1", self.port), trace_packet=self.garble)
-        await self.server.serve_forever(background=True)
+        try:
+            await self.server.serve_forever(background=True)
+        except RuntimeError as error:  # of which pymodbus says neither the address nor the reason
+            raise RuntimeError(f"cannot listen at 127.0.0.1:{self.port}, where something else may") from error
 
 
 class ModbusUnit(ModbusServer):
