@@ -15,6 +15,10 @@ def sign(bundle: str | None, key: str | None, make_key: str | None) -> int:
     A bundle shows by itself whether it was damaged, not who made it. `firable run --trust FILE.pub` and `firable verify
     --trust FILE.pub` refuse a bundle that none of the keys they name has signed. Several people may sign one bundle.
     """
+    if bundle is not None and key is None and make_key is not None:
+        raise click.UsageError(
+            f"--make-key makes a key and signs nothing with it: add `--key {make_key}` to sign {bundle}"
+        )
     if (bundle is None) != (key is None) or (bundle is None and make_key is None):
         raise click.UsageError("say which BUNDLE to sign, and with --key which key; --make-key FILE makes one")
     from firable.cli.options import refuse_a_net

@@ -38,5 +38,9 @@ def test_what_is_missing_to_sign_is_told(bundle: Path, capsys: pytest.CaptureFix
     for arguments in ([], [str(bundle)], ["--key", str(bundle.with_name("ours"))]):
         assert main(["sign", *arguments]) == 2
         assert "--make-key" in capsys.readouterr().err
+    key = bundle.with_name("new")
+    assert main(["sign", str(bundle), "--make-key", str(key)]) == 2
+    assert f"--make-key makes a key and signs nothing with it: add `--key {key}`" in capsys.readouterr().err
+    assert not key.exists()
     assert main(["verify", str(bundle.with_name("ours")), "--trust", f"{bundle.with_name('ours')}.pub"]) == 2
     assert "documents" in capsys.readouterr().err
