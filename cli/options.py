@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
@@ -191,10 +191,21 @@ def catalogue_file(argument: str, kind: str) -> Path:
     return path.with_name(f"{name}.plant.yaml") if kind == "plant" else path
 
 
+_OTHER_FILES: Final = {
+    ".plant.yaml": "a plant file",
+    ".bind.yaml": "a binding",
+    ".tasks.yaml": "a file of tasks",
+    ".layout.yaml": "a layout file",
+}
+
+
 def refuse_a_net(file: str, wanted: str, then: str = "") -> None:
     """A net is no bundle: say what is wanted instead, and how a bundle is made of it, for the command `then`."""
     from firable.nets.loading import PNML_SUFFIXES, TEXT_SUFFIXES
 
+    for suffix, what in _OTHER_FILES.items():
+        if file.lower().endswith(suffix):
+            raise click.UsageError(f"'{file}' is {what}, and {wanted}")
     if file.startswith(CATALOGUE) or Path(file).suffix.lower() in PNML_SUFFIXES | TEXT_SUFFIXES:
         bundle = f"{Path(file.removeprefix(CATALOGUE)).name.partition('.')[0] or 'net'}.bundle"
         raise click.UsageError(

@@ -25,7 +25,7 @@ _NAME, _METHOD = "trace", "replay by the reference player"
 
 @click.command(short_help="Play a trace by the reference player: is it one of the net?")
 @click.argument("traces", metavar="TRACE...", nargs=-1, required=True)
-@click.option("--net", "of", metavar="NET", required=True, help="The net, or the bundle, that the trace is of.")
+@click.option("--net", "of", metavar="NET", help="The net, or the bundle, that the trace is of (required).")
 @click.option(
     "--machines",
     metavar="PLANT",
@@ -41,7 +41,7 @@ _NAME, _METHOD = "trace", "replay by the reference player"
 @format_option
 def replay(
     traces: tuple[str, ...],
-    of: str,
+    of: str | None,
     machines: str | None,
     latency_seconds: float | None,
     output: str | None,
@@ -58,6 +58,12 @@ def replay(
     With --machines, the signals and commands are held against the machines of a plant file, as a run does: the first
     signal, or the absence of one, that nothing explains is shown, with the places of the cell that it touches.
     """
+    from firable.nets.loading import is_bundle
+
+    if (bundle := next(filter(is_bundle, traces), None)) is not None:
+        raise click.UsageError(f"'{bundle}' is a bundle and no trace: `firable replay TRACE --net {bundle}`")
+    if of is None:
+        raise click.UsageError("Missing option '--net': say which net, or which bundle, the trace is of")
     if latency_seconds is not None and machines is None:
         raise click.UsageError("--latency is of the machines: say which with --machines")
     return answer("replay", format_, lambda: _report(traces, of, machines, latency_seconds, output), _show)

@@ -75,6 +75,13 @@ def load(path: str | Path) -> Loaded:
     return Loaded(net, positions=positions)
 
 
+def is_bundle(path: str | Path) -> bool:
+    """Whether a file begins as bundles do, and no text does."""
+    from firable.nets.archive import SIGNATURE
+
+    return _head(path).startswith(SIGNATURE)
+
+
 def _head(path: str | Path) -> bytes:
     """The first bytes of a file; none where it cannot be read, which the reader finds again and says well."""
     try:

@@ -13,6 +13,7 @@ import pytest
 import firable.analysis.check
 from firable.cli.main import main
 from firable.executor.drivers.binding import parse_binding
+from firable.nets.archive import SIGNATURE
 from firable.nets.catalogue import catalogue_path
 from firable.nets.diagnostics import InputError
 from firable.nets.drawing.layout_file import parse_layout
@@ -128,7 +129,8 @@ def test_what_is_no_net_file_is_refused_at_once(tmp_path: Path, capsys: pytest.C
         (["bundle", "x", "-o", "y", "--tasks", "z"], "--tasks goes with --conceptual"),
         (["run", "x", "--workpieces", "-1"], "Invalid value"),
         (["run", "x", "--speed", "100"], "is not one of"),
-        (["replay", "x"], "Missing option"),
+        (["run", "x.plant.yaml"], "'x.plant.yaml' is a plant file, and what runs is a bundle"),
+        (["replay", "x"], "Missing option '--net'"),
         (["draw", "catalogue:machines-5000"], "20,000 places and transitions make no picture"),
         (["view", "catalogue:machines-5000"], "20,000 places and transitions make no picture"),
         (["draw", "catalogue:one_robot", "--marking", "robot.fre"], "no place 'robot.fre'"),
@@ -217,6 +219,14 @@ def test_a_mistake_in_a_file_of_tasks_or_in_its_use_is_one_clear_error(
     assert "error[F4012]" in said
     assert "add 'system.mc' to `from`" in said
     assert not (tmp_path / "late.yaml").exists()
+
+
+def test_a_bundle_is_no_trace(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bundle = tmp_path / "cell.bundle"
+    bundle.write_bytes(SIGNATURE)
+    for arguments in ((), ("--net", "catalogue:one_robot")):
+        said = refused(capsys, "replay", str(bundle), *arguments)
+        assert f"'{bundle}' is a bundle and no trace: `firable replay TRACE --net {bundle}`" in said
 
 
 def test_a_plant_that_does_not_fit_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
