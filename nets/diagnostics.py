@@ -246,6 +246,10 @@ def with_meant(message: str, name: str, known: Sequence[str]) -> str:
 
 def unknown_name(code: str, kind: str, name: str, known: Collection[str], subject: Subject) -> Diagnostic:
     """The diagnostic on a name that nothing has, with the known name that was probably meant."""
+    owner, _, own = name.partition(".")
+    if f"{owner}.{name}" in known:  # declared by its full name, where the local one is expected
+        hint = f"'{owner}.{name}' is declared: inside '{owner}' names are local, so write '{own}' there"
+        return Diagnostic(code, f"there is no {kind} '{name}'", hint, subject)
     local = min((full for full in known if full.rpartition(".")[2] == name), default=None)
     # Names much longer or shorter are no slips of the pen, and would be sorted for nothing.
     similar = sorted(full for full in known if abs(len(full) - len(name)) <= 4)

@@ -134,6 +134,14 @@ class _Scope:
     def local(self, full: str) -> str:
         return full if self.owner is None else full.removeprefix(f"{self.owner}.")
 
+    def is_full(self, name: str) -> bool:
+        """Whether a name that stands here is the full one of a place of this scope, where the local one is expected."""
+        return name not in self.places and self.local(name) in self.places
+
+    def said_local(self, name: str) -> str:
+        """The hint on a full name."""
+        return f"inside '{self.owner}' names are local: write '{self.local(name)}'"
+
 
 class _Reading:
     """One document on its way to a `Net`."""
@@ -223,6 +231,11 @@ class _Reading:
             )
             yield made
             if within is None:
+                continue
+            if within.to and scope.is_full(within.to):
+                subject = ("places", full, "within", "to")
+                message = f"there is no place '{scope.full(within.to)}' to go to"
+                self.problem(Diagnostic("F2002", message, scope.said_local(within.to), subject))
                 continue
             fault = fault_place(made)
             to = scope.full(within.to) if within.to else fault.name
@@ -328,8 +341,8 @@ class _Reading:
 def _unknown_start(scope: _Scope, local: str, subject: Subject) -> Diagnostic:
     from firable.nets.diagnostics import did_you_mean
 
-    if scope.owner and local.removeprefix(f"{scope.owner}.") in scope.places:
-        hint = f"inside '{scope.owner}' names are local: write '{local.removeprefix(f'{scope.owner}.')}'"
+    if scope.is_full(local):
+        hint = scope.said_local(local)
     else:
         hint = did_you_mean(local, list(scope.places)) + "`start` names places of the same `places`"
     return Diagnostic("F2002", f"there is no place '{scope.full(local)}' to start in", hint, subject)

@@ -140,6 +140,11 @@ TABLE = (
     net("start that is no place", "places: {p: }\nstart: q\n", "F2002 4:8", "`start` names places"),
     net("start with a full name", ROBOT.replace("start: free", "start: robot.free"), "F2002 5:12",
         "inside 'robot' names are local: write 'free'"),
+    net("sensor declared with its full name", ROBOT.replace("inputs: door", "inputs: robot.door")
+        + T + "  t: {from: robot.free, if: robot.door_shut}\n", "F2021 11:29",
+        "inside 'robot' names are local, so write 'door_shut' there"),
+    net("fault place with a full name", ROBOT.replace("at_home}", "at_home, within: {time: 5s, to: robot.free}}"),
+        "F2002 9:88", "inside 'robot' names are local: write 'free'"),
     net("two tokens", "places: {p: }\nstart: [p, p]\n", "F2006 4:12", "a place holds one token at most"),
     net("wrong name", ROBOT + T + "  t: {from: robot.fre}\n", "F2002 11:13", "did you mean 'robot.free'?"),
     net("missing owner", ROBOT + T + "  t: {from: free}\n", "F2002 11:13", "did you mean 'robot.free'?"),
