@@ -200,7 +200,8 @@ def _joined(problems: list[Diagnostic]) -> list[Diagnostic]:
         lines = dict.fromkeys(problem.span.line for problem in group[1:] if problem.span)
         if first.code in _UNKNOWN and lines:
             shown = ", ".join(map(str, list(lines)[:5])) + (", ..." if len(lines) > 5 else "")
-            first = replace(first, message=f"{first.message} (also on line {shown})")
+            word = "line" if len(lines) == 1 else "lines"
+            first = replace(first, message=f"{first.message} (also on {word} {shown})")
         joined.append(first)
     return joined
 

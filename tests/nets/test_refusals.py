@@ -269,7 +269,7 @@ def test_repeated_use_of_one_wrong_name_tells_the_lines() -> None:
     with pytest.raises(InputError) as refused:
         parse_net(HEAD + T + "".join(f"  t{i}: {{from: p}}\n" for i in range(4)))
     (problem,) = refused.value.diagnostics
-    assert problem.message == "there is no place 'p' (also on line 5, 6, 7)"
+    assert problem.message == "there is no place 'p' (also on lines 5, 6, 7)"
 
 
 @pytest.mark.parametrize(
