@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from firable.cli import text
+from firable.cli.files import READ, WRITTEN
 from firable.cli.loop import machines_option, plant_text
 from firable.cli.options import (
     analysis_options,
@@ -30,13 +31,14 @@ if TYPE_CHECKING:
 
 @click.command(short_help="Check and prove a net, and seal it in a bundle that may run.")
 @net_argument
-@click.option("-o", "--output", metavar="FILE", required=True, help="The bundle to write.")
+@click.option("-o", "--output", metavar="FILE", type=WRITTEN, required=True, help="The bundle to write.")
 @machines_option
 @click.option("--faults", is_flag=True, help="The same under lost and doubled messages, crashes and restarts.")
 @click.option("--protocol", is_flag=True, help="Hold the proof on the voting protocol of this very net, too.")
 @click.option(
     "--conceptual",
     metavar="NET",
+    type=READ,
     help="Hold the conceptual net that NET was made of by `firable refine`, and that it does what that one does.",
 )
 @tasks_option

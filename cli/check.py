@@ -14,6 +14,7 @@ from firable.analysis.methods import Method
 from firable.cli import text
 from firable.cli.choice import OneOf
 from firable.cli.evidence_files import is_evidence
+from firable.cli.files import FOLDER, READ, WRITTEN, net_files
 from firable.cli.loop import loop_report, machines_option, show_loop
 from firable.cli.net_files import demand_a_file
 from firable.cli.options import (
@@ -22,7 +23,6 @@ from firable.cli.options import (
     budget,
     formats_option,
     load_net,
-    net_files,
     page_option,
     with_page,
     write_folder,
@@ -69,7 +69,7 @@ class _Asked:
 
 
 @click.command(short_help="Check nets: deadlock, contact, liveness, conflicts, their own properties.")
-@click.argument("nets", metavar="NET...", nargs=-1, required=True)
+@click.argument("nets", metavar="NET...", type=READ, nargs=-1, required=True)
 @click.option(
     "--discipline",
     type=OneOf(["interleaving", "step"]),
@@ -85,22 +85,36 @@ class _Asked:
     help="Let one technique answer; `auto` lets them race where exploring a moment does not suffice.",
 )
 @analysis_options
-@click.option("--trace-dir", metavar="DIR", help="Write the firing sequence of each violation, for `firable replay`.")
+@click.option(
+    "--trace-dir",
+    metavar="DIR",
+    type=FOLDER,
+    help="Write the firing sequence of each violation, for `firable replay`.",
+)
 @click.option(
     "--evidence",
     "evidence_dir",
     metavar="DIR",
+    type=FOLDER,
     help="Write evidence of what is decided, for `firable verify`; takes at most --max-seconds more, or 30.",
 )
 @click.option(
     "--structure", is_flag=True, help="Also net class, invariants, siphons, traps; in --max-seconds more, or 30."
 )
-@click.option("--queries", "query_file", metavar="FILE", help="Answer the queries of a file, text or property XML.")
+@click.option(
+    "--queries", "query_file", metavar="FILE", type=READ, help="Answer the queries of a file, text or property XML."
+)
 @click.option(
     "--query", "query_texts", metavar="QUERY", multiple=True, help="Answer a query, such as 'AG EF start'; repeatable."
 )
 @machines_option
-@click.option("--loop-net", "loop_file", metavar="FILE", help="Write the net that NET and its --machines are together.")
+@click.option(
+    "--loop-net",
+    "loop_file",
+    metavar="FILE",
+    type=WRITTEN,
+    help="Write the net that NET and its --machines are together.",
+)
 @page_option
 @click.option(
     "--no-cache", is_flag=True, help="Decide anew what was decided before of the same net; see FIRABLE_CACHE."

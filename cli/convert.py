@@ -7,14 +7,20 @@ from pathlib import Path
 import click
 
 from firable.cli import text
+from firable.cli.files import READ, WRITTEN
 from firable.cli.net_files import write_net
 from firable.cli.options import load_net, write_text
 
 
 @click.command(short_help="Convert a net between *.firable.yaml and PNML.")
-@click.argument("source", metavar="NET")
+@click.argument("source", metavar="NET", type=READ)
 @click.option(
-    "-o", "--output", metavar="FILE", required=True, help="*.firable.yaml or *.pnml: the extension says which."
+    "-o",
+    "--output",
+    metavar="FILE",
+    type=WRITTEN,
+    required=True,
+    help="*.firable.yaml or *.pnml: the extension says which.",
 )
 def convert(source: str, output: str) -> int:
     """Convert NET to the format of the file named by --output.

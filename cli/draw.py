@@ -8,6 +8,7 @@ from typing import Final
 import click
 
 from firable.cli.choice import OneOf
+from firable.cli.files import READ, WRITTEN
 from firable.cli.options import load_net, net_argument, write_text
 
 _OF: Final[Mapping[str, tuple[str, ...]]] = {
@@ -26,7 +27,12 @@ _OF: Final[Mapping[str, tuple[str, ...]]] = {
 @click.command(short_help="Draw a net, its coordinator, its reachability graph or a run of it, as SVG.")
 @net_argument
 @click.option(
-    "-o", "--output", metavar="FILE.svg", default="-", help="The file to write; - is standard output.  [default: -]"
+    "-o",
+    "--output",
+    metavar="FILE.svg",
+    type=WRITTEN,
+    default="-",
+    help="The file to write; - is standard output.  [default: -]",
 )
 @click.option(
     "--what",
@@ -41,6 +47,7 @@ _OF: Final[Mapping[str, tuple[str, ...]]] = {
 @click.option(
     "--trace",
     metavar="FILE",
+    type=READ,
     help="Show the marking where this trace ends, and which step fired what; the run of a strip.",
 )
 @click.option(

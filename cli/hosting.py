@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
 import click
 
 from firable.cli import text
+from firable.cli.files import JOURNAL, READ
 from firable.cli.finite import FiniteRange
 from firable.cli.log import told_aside
 from firable.cli.report import Report
@@ -108,7 +109,7 @@ def host_options(command: F) -> F:
             ),
             click.option(
                 "--tls",
-                nargs=3,
+                type=(READ, READ, READ),
                 metavar="CA CERT KEY",
                 help="The files of the site's authority, and of this host's certificate and key, for tls/ addresses.",
             ),
@@ -127,6 +128,7 @@ def host_options(command: F) -> F:
             click.option(
                 "--journal",
                 metavar="FILE",
+                type=JOURNAL,
                 help="Keep what a restart needs; a run that was killed is taken up from it.",
             ),
             click.option(
@@ -134,7 +136,9 @@ def host_options(command: F) -> F:
                 is_flag=True,
                 help="After a restart go on as soon as it is known what became of each command.",
             ),
-            click.option("--bind", metavar="FILE", help="Run on real machines: where they and the sensors are."),
+            click.option(
+                "--bind", metavar="FILE", type=READ, help="Run on real machines: where they and the sensors are."
+            ),
             click.option(
                 "--dry-run",
                 type=FiniteRange(min=0.0),

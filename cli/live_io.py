@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from firable.cli.choice import OneOf
+from firable.cli.files import READ
 from firable.cli.finite import FiniteRange
 from firable.cli.options import load_net
 
@@ -27,7 +28,7 @@ _COLOURS = {"good": "green", "uncertain": "yellow", "bad": "red"}
 
 
 @click.command("io", short_help="Show the live signals of a binding; force them where it allows that.")
-@click.argument("bind", metavar="BIND")
+@click.argument("bind", metavar="BIND", type=READ)
 @click.option("--once", is_flag=True, help="Show everything once, when it has been read, and end.")
 @click.option("--for", "seconds", type=FiniteRange(min=0), metavar="SECONDS", help="End by itself after so long.")
 @click.option("--force", metavar="SIGNAL=0|1", multiple=True, help="Write a signal on its device.")
@@ -40,7 +41,7 @@ _COLOURS = {"good": "green", "uncertain": "yellow", "bad": "red"}
     show_default=True,
     help="How to print: as a table, or one JSON document a line; `firable schema io` prints its schema.",
 )
-@click.option("--net", "of", metavar="NET", help="The net, or the bundle, whose commands are sent.")
+@click.option("--net", "of", metavar="NET", type=READ, help="The net, or the bundle, whose commands are sent.")
 def live_io(
     bind: str,
     once: bool,

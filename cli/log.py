@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from firable.cli.files import WRITTEN
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
@@ -25,6 +27,7 @@ def log_option(command: F) -> F:
     return click.option(
         "--log",
         metavar="FILE",
+        type=WRITTEN,
         help="Tell in JSON lines, with levels and the time of day, what happens to the run; - is standard error.",
     )(command)
 

@@ -13,8 +13,9 @@ import click
 
 from firable.cli import text
 from firable.cli.evidence_files import is_evidence
+from firable.cli.files import CATALOGUE, READ
 from firable.cli.net_files import write_net
-from firable.cli.options import CATALOGUE, catalogue_file, load_net, write_folder
+from firable.cli.options import catalogue_file, load_net, write_folder
 from firable.cli.report import Report
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 machines_option = click.option(
     "--machines",
     metavar="PLANT",
+    type=READ,
     help="Close the loop with the machines of a plant file, or of catalogue:NAME; see docs/machines.md.",
 )
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from firable.cli.files import refuse_to_overwrite
 from firable.cli.options import write_text
 
 if TYPE_CHECKING:
@@ -32,19 +33,28 @@ def write_net(path: str, net: Net) -> tuple[str, ...]:
     Its schema is the nearest `net.schema.json` beside it or above it, up to the folder that the command runs in; where
     there is none, it is written beside it. Raises `InputError` F1017 as `write_text` does.
     """
+    from firable.cli.schema import schema_text
     from firable.nets.printing import format_net
 
     found = _schema_above(Path(path).absolute())
+    schema = str(Path(path).parent / SCHEMA_FILE)
+    if found is None:
+        refuse_to_overwrite([schema])
     write_text(path, f"# yaml-language-server: $schema={found or SCHEMA_FILE}\n{format_net(net)}")
-    return (path,) if found else (path, _write_schema(Path(path).parent))
+    if found is not None:
+        return (path,)
+    write_text(schema, schema_text("net"))
+    return path, schema
 
 
 def write_nets(folder: str, nets: Mapping[str, Net]) -> tuple[str, ...]:
     """Write net files into a folder, made if it is missing, as `write_net` does; returns the files written."""
     from firable.nets.writing import make_folder
 
+    paths = {str(Path(folder, name)): net for name, net in nets.items()}
+    refuse_to_overwrite(paths)
     make_folder(folder)
-    return tuple(file for name, net in nets.items() for file in write_net(str(Path(folder, name)), net))
+    return tuple(file for path, net in paths.items() for file in write_net(path, net))
 
 
 def _schema_above(file: Path) -> str | None:
@@ -55,11 +65,3 @@ def _schema_above(file: Path) -> str | None:
         if not folder.is_relative_to(here) or folder == here:
             break
     return None
-
-
-def _write_schema(folder: Path) -> str:
-    from firable.cli.schema import schema_text
-
-    path = str(folder / SCHEMA_FILE)
-    write_text(path, schema_text("net"))
-    return path

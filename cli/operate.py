@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import click
 
 from firable.cli.choice import OneOf
+from firable.cli.files import READ
 
 if TYPE_CHECKING:
     from firable.executor import Host
@@ -100,10 +101,22 @@ def _page(host: Host, bundle: str, plant: PlantModel | None) -> Page:
 def serve_options(command: F) -> F:
     """The options of a run that an operator may act on from elsewhere."""
     for option in (
-        click.option("--operators", metavar="CA", help="Let in whoever has a certificate of this authority instead."),
-        click.option("--serve-tls", metavar="CERT KEY", nargs=2, help="The certificate and key of that endpoint."),
+        click.option(
+            "--operators",
+            metavar="CA",
+            type=READ,
+            help="Let in whoever has a certificate of this authority instead.",
+        ),
+        click.option(
+            "--serve-tls", metavar="CERT KEY", type=(READ, READ), help="The certificate and key of that endpoint."
+        ),
         click.option("--open", "open_", is_flag=True, help="Open the page of the run in a browser; see docs/view.md."),
-        click.option("--token-file", metavar="FILE", help="Its token; made, for you alone to read, if there is none."),
+        click.option(
+            "--token-file",
+            metavar="FILE",
+            type=READ,
+            help="Its token; made, for you alone to read, if there is none.",
+        ),
         click.option(
             "--serve",
             metavar="ADDRESS:PORT",
@@ -118,9 +131,11 @@ def serve_options(command: F) -> F:
 @click.argument("address", metavar="ADDRESS")
 @click.argument("command", type=OneOf(_COMMANDS))
 @click.argument("what", metavar="[PLACE=ANSWER]", required=False)
-@click.option("--token-file", metavar="FILE", help="The file with the token that the run was given or has made.")
-@click.option("--ca", metavar="FILE", help="The authority of the run's certificate, for https addresses.")
-@click.option("--cert", metavar="CERT KEY", nargs=2, help="Your certificate and its key, instead of a token.")
+@click.option(
+    "--token-file", metavar="FILE", type=READ, help="The file with the token that the run was given or has made."
+)
+@click.option("--ca", metavar="FILE", type=READ, help="The authority of the run's certificate, for https addresses.")
+@click.option("--cert", metavar="CERT KEY", type=(READ, READ), help="Your certificate and its key, instead of a token.")
 def operate(
     address: str, command: str, what: str | None, token_file: str | None, ca: str | None, cert: tuple[str, str] | None
 ) -> int:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import click
 
 from firable.cli.choice import OneOf
+from firable.cli.files import CATALOGUE, READ, WRITTEN, is_folder, nets_below, refuse_to_overwrite
 from firable.cli.finite import FiniteRange
 from firable.cli.report import Outcome, Report, document, exit_code_of, worst
 
@@ -21,12 +21,10 @@ if TYPE_CHECKING:
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-CATALOGUE = "catalogue:"
-NET_FILES = (".firable.yaml", ".firable.yml")
 _MEBIBYTE = 2**20
 _NO_NETS = "name a file, or a folder with files *.firable.yaml in it or below"
 
-net_argument = click.argument("net", metavar="NET")
+net_argument = click.argument("net", metavar="NET", type=READ)
 format_option = click.option(
     "--format",
     "format_",
@@ -41,6 +39,8 @@ _WRITTEN = "firable.written"  # where the context of a command keeps what --writ
 
 
 def _remember(context: click.Context, _: click.Parameter, value: tuple[tuple[str, str], ...]) -> None:
+    if any(file == "-" for _, file in value):
+        raise click.UsageError("--write is for files: what goes to standard output is named by --format")
     context.meta[_WRITTEN] = value
 
 
@@ -49,7 +49,7 @@ def formats_option(command: F) -> F:
     for option in (
         click.option(
             "--write",
-            type=(OneOf(["json", "sarif", "junit"]), str),
+            type=(OneOf(["json", "sarif", "junit"]), WRITTEN),
             multiple=True,
             metavar="FORMAT FILE",
             expose_value=False,
@@ -71,7 +71,11 @@ def formats_option(command: F) -> F:
 
 
 page_option = click.option(
-    "--report", "page", metavar="FILE", help="Write the report as one HTML page, to read, print and send."
+    "--report",
+    "page",
+    metavar="FILE",
+    type=WRITTEN,
+    help="Write the report as one HTML page, to read, print and send.",
 )
 
 
@@ -135,7 +139,7 @@ def load_net(argument: str) -> Loaded:
     from firable.nets.loading import Loaded, load
 
     if not argument.startswith(CATALOGUE):
-        if _is_folder(Path(argument)) and not _nets_below(Path(argument)):
+        if is_folder(argument) and not nets_below(argument):
             raise InputError([Diagnostic("F1001", f"no net file is in {argument}", _NO_NETS)])
         return load(argument)
     name = argument.removeprefix(CATALOGUE)
@@ -149,35 +153,6 @@ def load_net(argument: str) -> Loaded:
         raise click.UsageError(_not_in_catalogue(name)) from None
     except ValueError as error:
         raise click.UsageError(str(error)) from None
-
-
-def net_files(arguments: Sequence[str]) -> tuple[str, ...]:
-    """The arguments, with every folder replaced by the net files below it, in the order of their names.
-
-    A folder without a net file stays, for `load_net` to refuse.
-    """
-    found: list[str] = []
-    for argument in arguments:
-        below = [] if argument.startswith(CATALOGUE) or not _is_folder(Path(argument)) else _nets_below(Path(argument))
-        found += map(str, sorted(below)) if below else [argument]
-    return tuple(found)
-
-
-def _nets_below(folder: Path) -> list[Path]:
-    """The net files of a project: none in hidden folders, nor in what is installed there, which has a catalogue."""
-    found = []
-    for here, folders, files in os.walk(folder):
-        folders[:] = [one for one in folders if not one.startswith(".") and not Path(here, one, "pyvenv.cfg").exists()]
-        paths = (Path(here, one) for one in files if one.endswith(NET_FILES))
-        found += [path for path in paths if path.is_file()]
-    return found
-
-
-def _is_folder(path: Path) -> bool:
-    try:
-        return path.is_dir()
-    except OSError:  # a name that no file can have
-        return False
 
 
 def catalogue_file(argument: str, kind: str) -> Path:
@@ -235,30 +210,18 @@ def write_text(path: str, text: str) -> None:
 
 
 def write_folder(folder: str, files: Mapping[str, str | bytes]) -> tuple[str, ...]:
-    """Write files into a folder, made if it is missing; returns their paths. Raises `InputError` F1017."""
+    """Write files into a folder, made if it is missing; returns their paths.
+
+    Raises `InputError` F1017, before anything is written where a file is one that the command reads.
+    """
     from firable.nets.writing import make_folder, write_whole
 
-    make_folder(folder)
     paths = {str(Path(folder) / name): data for name, data in files.items()}
+    refuse_to_overwrite(paths)
+    make_folder(folder)
     for path, data in paths.items():
         write_whole(path, data)
     return tuple(paths)
-
-
-def _listed(values: Iterable[object]) -> Iterator[str]:
-    """The texts among the values of a command's parameters: files, among others."""
-    for value in values:
-        if isinstance(value, str):
-            yield value
-        elif isinstance(value, tuple):
-            yield from _listed(value)
-
-
-def _is_same(one: Path, other: Path) -> bool:
-    try:
-        return one.exists() and other.exists() and one.samefile(other)
-    except (OSError, ValueError):
-        return False
 
 
 def answer(
@@ -282,12 +245,6 @@ def answer_all(
     from firable.nets.diagnostics import InputError
 
     written: Sequence[tuple[str, str]] = click.get_current_context().meta.get(_WRITTEN, ())
-    given = [Path(file) for file in map(str, _listed(click.get_current_context().params.values())) if file]
-    for _, file in written:
-        if file == "-":
-            raise click.UsageError("--write is for files: what goes to standard output is named by --format")
-        if any(_is_same(Path(file), path) for path in given):
-            raise click.UsageError(f"--write {file} would overwrite what the command reads: name another file")
     reports: list[Report] = []
     errors: list[Diagnostic] = []
     as_text = format_ in {"text", "github"}

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from firable.cli.options import CATALOGUE
+from firable.cli.files import CATALOGUE
 from firable.cli.text import counted
 
 if TYPE_CHECKING:

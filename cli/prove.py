@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from firable.cli import text
+from firable.cli.files import FOLDER
 from firable.cli.finite import FiniteRange
 from firable.cli.loop import machines_option, read_machines
 from firable.cli.options import answer, formats_option, load_net, net_argument, page_option, with_page, write_folder
@@ -29,7 +30,9 @@ SIGNS: Final = {"violated": ("✗", "red"), "unknown": ("?", "yellow"), "proved"
 
 @click.command(short_help="Split a net over its controllers, and prove the parts equal to the whole.")
 @net_argument
-@click.option("--smt-dir", metavar="DIR", help="Write the obligations as SMT-LIB 2 files, for another solver.")
+@click.option(
+    "--smt-dir", metavar="DIR", type=FOLDER, help="Write the obligations as SMT-LIB 2 files, for another solver."
+)
 @click.option(
     "--timeout",
     type=FiniteRange(min=0.001),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from firable.cli import text
+from firable.cli.files import FOLDER, READ, WRITTEN
 from firable.cli.net_files import SCHEMA_FILE, demand_a_file, write_net
 from firable.cli.options import (
     analysis_options,
@@ -44,6 +45,7 @@ tasks_option = click.option(
     "--tasks",
     "files",
     metavar="FILE",
+    type=READ,
     multiple=True,
     help="A file of registered tasks (*.tasks.yaml); may be given again. They come before those of the catalogue.",
 )
@@ -52,7 +54,13 @@ tasks_option = click.option(
 @click.command(short_help="Open the tasks of a conceptual net to a detailed net, and carry over its verdicts.")
 @net_argument
 @tasks_option
-@click.option("-o", "--output", metavar="FILE", help="Write the detailed net there, as a net file (*.firable.yaml).")
+@click.option(
+    "-o",
+    "--output",
+    metavar="FILE",
+    type=WRITTEN,
+    help="Write the detailed net there, as a net file (*.firable.yaml).",
+)
 @click.option("--cell", metavar="NAME", default="", help="The name of the detailed net; by default that of NET.")
 @click.option(
     "--confirm/--no-confirm",
@@ -63,6 +71,7 @@ tasks_option = click.option(
     "--evidence",
     "evidence_dir",
     metavar="DIR",
+    type=FOLDER,
     help="Write what shows the conditions of each task, the verdicts on NET and, where that is small, those on the "
     "detailed net, for `firable verify`.",
 )

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from firable.cli import text
+from firable.cli.files import READ
 from firable.cli.options import answer, format_option, load_net
 from firable.cli.report import Report
 
@@ -24,7 +25,7 @@ _FAILURES_MAX = 5
 
 
 @click.command(short_help="Run a cell's controllers through crashes and faults, many times, from seeds.")
-@click.argument("net", metavar="NET")
+@click.argument("net", metavar="NET", type=READ)
 @click.option(
     "--seeds", type=click.IntRange(min=1), default=1000, show_default=True, metavar="N", help="How many runs."
 )

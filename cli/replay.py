@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from firable.cli import text
+from firable.cli.files import READ, WRITTEN
 from firable.cli.finite import FiniteRange
 from firable.cli.options import answer, format_option, load_net, write_text
 from firable.cli.report import Report
@@ -24,11 +25,12 @@ _NAME, _METHOD = "trace", "replay by the reference player"
 
 
 @click.command(short_help="Play a trace by the reference player: is it one of the net?")
-@click.argument("traces", metavar="TRACE...", nargs=-1, required=True)
-@click.option("--net", "of", metavar="NET", help="The net, or the bundle, that the trace is of (required).")
+@click.argument("traces", metavar="TRACE...", type=READ, nargs=-1, required=True)
+@click.option("--net", "of", metavar="NET", type=READ, help="The net, or the bundle, that the trace is of (required).")
 @click.option(
     "--machines",
     metavar="PLANT",
+    type=READ,
     help="Ask too whether the machines did what this plant file allows; catalogue:NAME for one of the catalogue.",
 )
 @click.option(
@@ -37,7 +39,13 @@ _NAME, _METHOD = "trace", "replay by the reference player"
     type=FiniteRange(min=0.0, min_open=True),
     help="With --machines: how many seconds after its change a signal is taken at the latest.  [default: 0.5]",
 )
-@click.option("-o", "--output", metavar="FILE", help="Write the one trace that the traces of several hosts make.")
+@click.option(
+    "-o",
+    "--output",
+    metavar="FILE",
+    type=WRITTEN,
+    help="Write the one trace that the traces of several hosts make.",
+)
 @format_option
 def replay(
     traces: tuple[str, ...],

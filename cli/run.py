@@ -13,10 +13,11 @@ from click.core import ParameterSource
 from firable.cli import text
 from firable.cli.bound_run import run_bound_of, show_bound
 from firable.cli.choice import OneOf
+from firable.cli.files import CATALOGUE, READ, WRITTEN
 from firable.cli.hosting import HostOptions, host_options, run_host_of, show_host
 from firable.cli.log import log_option, log_to, told_aside
 from firable.cli.operate import ServeOptions, serve_options
-from firable.cli.options import CATALOGUE, answer, catalogue_file, format_option, refuse_a_net
+from firable.cli.options import answer, catalogue_file, format_option, refuse_a_net
 from firable.cli.report import Report
 from firable.cli.sign import trust_option
 from firable.cli.watched import machines_verdict, show_coalesced
@@ -33,8 +34,10 @@ _SPEEDS = {"max": None, "1": 1.0, "10": 10.0}
 
 
 @click.command(short_help="Run a bundle on the simulated cell, or on real machines.")
-@click.argument("bundle", metavar="BUNDLE")
-@click.option("--plant", metavar="FILE", help="The plant file of the cell, or catalogue:NAME.  [default: by its name]")
+@click.argument("bundle", metavar="BUNDLE", type=READ)
+@click.option(
+    "--plant", metavar="FILE", type=READ, help="The plant file of the cell, or catalogue:NAME.  [default: by its name]"
+)
 @click.option(
     "--workpieces", type=click.IntRange(min=1), default=10, show_default=True, help="How many to carry through."
 )
@@ -46,7 +49,7 @@ _SPEEDS = {"max": None, "1": 1.0, "10": 10.0}
     show_default=True,
     help="Times real time; max is virtual time, where a run is a function of bundle, plant and seed.",
 )
-@click.option("--trace", metavar="FILE", help="Write what happens to a file, for `firable replay`.")
+@click.option("--trace", metavar="FILE", type=WRITTEN, help="Write what happens to a file, for `firable replay`.")
 @log_option
 @trust_option
 @host_options
@@ -142,13 +145,11 @@ def run(
         from firable.executor import Watch, load, read_plant
         from firable.executor import run as run_bundle
 
+        _demand_a_file(trace)
         loaded = load(bundle, trust)
         plant_file = None
         if plant is not None or (options.bind is None and not options.is_one_of_several):
             plant_file = _plant_file(loaded, plant)
-        secrets = (token_file, operators, *(serve_tls or ()), *(options.tls or ()))
-        read = [path for path in (bundle, options.bind, plant_file, *trust, *secrets) if path is not None]
-        _refuse_to_overwrite(trace, log, *read, *_files_beside(options.journal))
         model = None if plant_file is None else read_plant(plant_file)
         service = served.service(bundle, model)
         pace = 1.0 if options.bind is not None else _SPEEDS[speed]
@@ -223,12 +224,6 @@ def _if_not_reported(tell: Callable[[str, str], None], kind: str, sentence: str)
         tell(kind, sentence)
 
 
-def _files_beside(journal: str | None) -> tuple[str, ...]:
-    """The files of a journal, those that SQLite makes beside it among them."""
-    beside = ("", ".cell", ".generation", "-wal", "-shm", "-journal")
-    return tuple(f"{journal}{suffix}" for suffix in beside) if journal else ()
-
-
 def _said(net: Net, say: tuple[str, ...], journal: str | None) -> dict[str, Answer]:
     """What the operator says of commands, by place."""
     from firable.executor.protocol.commands import SAID
@@ -263,30 +258,13 @@ def _plant_file(bundle: Bundle, argument: str | None) -> Path:
     return catalogue_file(argument, "plant") if argument.startswith(CATALOGUE) else Path(argument)
 
 
-def _refuse_to_overwrite(trace: str | None, log: str | None, *inputs: Path | str) -> None:
-    """Refuse a trace on standard output, where the report goes, and a trace or log in a file that the run reads, or in
-    one file both; `InputError` F1017.
-    """
+def _demand_a_file(trace: str | None) -> None:
+    """Refuse (F1017) a trace on standard output, where the report goes."""
     from firable.nets.diagnostics import Diagnostic, InputError
-    from firable.nets.source import printable
 
     if trace == "-":
         message = "-: the trace cannot go to standard output, where the report goes"
         raise InputError([Diagnostic("F1017", message, "name a file; one that is called so is ./-")])
-    for what, written in (("trace", trace), ("log", None if log == "-" else log)):
-        if written is not None and any(_is_same(Path(written), Path(path)) for path in inputs):
-            message = f"{printable(written)}: the {what} would overwrite what the run reads"
-            raise InputError([Diagnostic("F1017", message, f"name another file for the {what}")])
-    if trace is not None and log is not None and _is_same(Path(trace), Path(log)):
-        message = f"{printable(log)}: trace and log would be one file, which nobody could read"
-        raise InputError([Diagnostic("F1017", message, "name another file for the log")])
-
-
-def _is_same(one: Path, other: Path) -> bool:
-    try:
-        return one.resolve() == other.resolve() or one.samefile(other)
-    except (OSError, ValueError):  # no such file yet, or one that will not open either, and is told of then
-        return False
 
 
 def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, ...]:

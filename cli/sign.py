@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import click
 
+from firable.cli.files import MADE, READ
+
 
 @click.command(short_help="Sign a bundle, so that a site can demand who released it.")
-@click.argument("bundle", metavar="[BUNDLE]", required=False)
-@click.option("--key", metavar="FILE", help="The secret key to sign with.")
-@click.option("--make-key", metavar="FILE", help="Make a key: the secret one in FILE, the public one in FILE.pub.")
+@click.argument("bundle", metavar="[BUNDLE]", type=READ, required=False)
+@click.option("--key", metavar="FILE", type=READ, help="The secret key to sign with.")
+@click.option(
+    "--make-key", metavar="FILE", type=MADE, help="Make a key: the secret one in FILE, the public one in FILE.pub."
+)
 def sign(bundle: str | None, key: str | None, make_key: str | None) -> int:
     """Sign BUNDLE with a secret key (Ed25519): the signature is written beside it, to BUNDLE.signatures.
 
@@ -42,6 +46,7 @@ def sign(bundle: str | None, key: str | None, make_key: str | None) -> int:
 trust_option = click.option(
     "--trust",
     metavar="KEY",
+    type=READ,
     multiple=True,
     help="Refuse a bundle that is signed by none of these public keys; may be given several times.",
 )

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from firable.cli.files import CATALOGUE, MADE, READ
 from firable.cli.finite import FiniteRange
-from firable.cli.options import CATALOGUE, catalogue_file, load_net, write_text
+from firable.cli.options import catalogue_file, load_net, write_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -26,13 +27,20 @@ _PRESSED_SECONDS = 1.0
 
 
 @click.command(short_help="Serve the simulated cell over real protocols.")
-@click.argument("net", metavar="NET")
-@click.option("--plant", metavar="FILE", help="The plant file of the cell, or catalogue:NAME.  [default: by its name]")
+@click.argument("net", metavar="NET", type=READ)
+@click.option(
+    "--plant", metavar="FILE", type=READ, help="The plant file of the cell, or catalogue:NAME.  [default: by its name]"
+)
 @click.option("--modbus", is_flag=True, help="Serve machines over Modbus TCP.")
 @click.option("--opcua", is_flag=True, help="Serve machines over OPC UA.")
 @click.option("--mqtt", is_flag=True, help="Serve machines over MQTT, by mosquitto, which must be installed.")
 @click.option("--serial", is_flag=True, help="Serve machines on a serial line, by a pseudo-terminal.")
-@click.option("--bind", metavar="FILE", help="The binding: written where protocols are named, or else read and served.")
+@click.option(
+    "--bind",
+    metavar="FILE",
+    type=MADE,
+    help="The binding: written where protocols are named, or else read and served.",
+)
 @click.option("--workpieces", type=click.IntRange(min=0), default=10, show_default=True, help="How many will come.")
 @click.option("--seed", type=int, default=0, show_default=True, help="The seed of the cell's jitter.")
 @click.option("--speed", type=FiniteRange(min=0.01), default=1.0, show_default=True, help="Times real time.")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from firable.cli import text
+from firable.cli.files import FOLDER, READ, WRITTEN
 from firable.cli.finite import FiniteRange
 from firable.cli.net_files import demand_a_file, write_net, write_nets
 from firable.cli.options import (
@@ -42,7 +43,7 @@ _CONTROLLERS_MAX = 30  # told of in text; the JSON has them all
     multiple=True,
     help="Give a controller the places and signals so named, such as robot='r_*,free'; repeatable.",
 )
-@click.option("--rules", metavar="FILE", help="Such rules in a file: a mapping of controllers to patterns.")
+@click.option("--rules", metavar="FILE", type=READ, help="Such rules in a file: a mapping of controllers to patterns.")
 @click.option(
     "--suggest",
     type=click.IntRange(min=1),
@@ -57,8 +58,16 @@ _CONTROLLERS_MAX = 30  # told of in text; the JSON has them all
     metavar="SHARE",
     help="By how much the sizes proposed may differ from their average.",
 )
-@click.option("-o", "--output", metavar="FILE", help="Write the net with its new owners as a net file.")
-@click.option("--subnets", "subnet_dir", metavar="DIR", help="Write the subnet of each controller as a net file.")
+@click.option(
+    "-o",
+    "--output",
+    metavar="FILE",
+    type=WRITTEN,
+    help="Write the net with its new owners as a net file.",
+)
+@click.option(
+    "--subnets", "subnet_dir", metavar="DIR", type=FOLDER, help="Write the subnet of each controller as a net file."
+)
 @click.option(
     "--max-seconds",
     type=FiniteRange(min=0),

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from firable.cli.files import JOURNAL, READ
 from firable.cli.options import analysis_options, budget, refuse_a_net
 
 if TYPE_CHECKING:
@@ -25,12 +26,13 @@ _ASKED = "taken-over"
 
 
 @click.command(short_help="Let a new bundle go on where an old one has stopped.")
-@click.argument("old", metavar="OLD")
-@click.argument("new", metavar="NEW")
+@click.argument("old", metavar="OLD", type=READ)
+@click.argument("new", metavar="NEW", type=READ)
 @click.option(
     "--journal",
     "journals",
     metavar="FILE",
+    type=READ,
     multiple=True,
     required=True,
     help="The journal of the run of OLD, which has stopped; of each of its hosts, where there are several.",
@@ -38,6 +40,7 @@ _ASKED = "taken-over"
 @click.option(
     "--into",
     metavar="FILE",
+    type=JOURNAL,
     multiple=True,
     required=True,
     help="Where to write the journal for the run of NEW: one for each --journal, in their order.",
@@ -237,9 +240,7 @@ def _refuse_standing(into: Sequence[str]) -> None:
     for file in into:
         message = f"{printable(file)}: a file stands there, and may be the journal of a cell"
         hint = "name another file"
-        if _is_twice(file, into):
-            message = f"{printable(file)}: two journals would be written there"
-        elif Path(f"{file}-wal").exists():  # SQLite would take it for the end of the new one
+        if Path(f"{file}-wal").exists():  # SQLite would take it for the end of the new one
             message = f"{printable(file)}-wal: what an earlier journal of that name has left stands there"
             hint = "name another file, or remove that one with its journal"
         elif not Path(file).exists():

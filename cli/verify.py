@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from firable.cli.choice import OneOf
+from firable.cli.files import FOLDER, READ
 from firable.cli.finite import FiniteRange
 from firable.cli.options import answer_all, formats_option, load_net, refuse_a_net, write_folder
 from firable.cli.progress import stages
@@ -30,8 +31,8 @@ _CLAIM_MAX = 100  # characters told of one claim
 
 
 @click.command(short_help="Check evidence or a bundle anew, without what made it.")
-@click.argument("evidence", metavar="EVIDENCE...", nargs=-1, required=True)
-@click.option("--net", "of", metavar="NET", help="Refuse evidence on any other net than this one.")
+@click.argument("evidence", metavar="EVIDENCE...", type=READ, nargs=-1, required=True)
+@click.option("--net", "of", metavar="NET", type=READ, help="Refuse evidence on any other net than this one.")
 @click.option(
     "--solver",
     type=OneOf(["cvc5", "z3"]),
@@ -39,7 +40,9 @@ _CLAIM_MAX = 100  # characters told of one claim
     show_default=True,
     help="Which solver answers the obligations of a bundle, which z3 has proved.",
 )
-@click.option("--smt-dir", metavar="DIR", help="Write each obligation as an SMT-LIB 2 file, for another solver.")
+@click.option(
+    "--smt-dir", metavar="DIR", type=FOLDER, help="Write each obligation as an SMT-LIB 2 file, for another solver."
+)
 @click.option(
     "--timeout",
     type=FiniteRange(min=0.001),

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from firable.cli.files import READ, WRITTEN
 from firable.cli.finite import FiniteRange
 from firable.cli.options import load_net, write_text
 from firable.cli.text import counted
@@ -28,12 +29,15 @@ _WRITERS: Final = {".vcd": ("vcd", "vcd"), ".perfetto.json": ("perfetto", "perfe
 
 
 @click.command(short_help="Draw what the machines did in a run, from when to when.")
-@click.argument("traces", metavar="TRACE...", nargs=-1, required=True)
-@click.option("--net", "of", metavar="NET", required=True, help="The net, or the bundle, that the trace is of.")
+@click.argument("traces", metavar="TRACE...", type=READ, nargs=-1, required=True)
+@click.option(
+    "--net", "of", metavar="NET", type=READ, required=True, help="The net, or the bundle, that the trace is of."
+)
 @click.option(
     "-o",
     "--output",
     metavar="FILE",
+    type=WRITTEN,
     required=True,
     help="*.svg, *.vcd, *.perfetto.json or *.xes: the extension says which; - is an SVG on standard output.",
 )

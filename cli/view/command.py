@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from firable.cli.files import CATALOGUE, NET_FILES, READ
 from firable.cli.loop import read_machines
-from firable.cli.options import CATALOGUE, NET_FILES, catalogue_file, load_net, net_argument
+from firable.cli.options import catalogue_file, load_net, net_argument
 
 if TYPE_CHECKING:
     from firable.cli.view.editing import Editing
@@ -18,10 +19,16 @@ if TYPE_CHECKING:
 
 @click.command(short_help="Show a net in the browser: play with it, see its counterexamples.")
 @net_argument
-@click.option("--trace", metavar="FILE", help="A run to play: of `firable check --trace-dir` or `firable run --trace`.")
+@click.option(
+    "--trace",
+    metavar="FILE",
+    type=READ,
+    help="A run to play: of `firable check --trace-dir` or `firable run --trace`.",
+)
 @click.option(
     "--plant",
     metavar="FILE",
+    type=READ,
     help="The plant file of the cell, or catalogue:NAME, for the top view.  [default: NAME.plant.yaml beside NET]",
 )
 @click.option(

@@ -251,10 +251,10 @@ def test_a_trace_or_a_log_in_a_file_of_the_journal_is_refused(
     for what in ("trace", "log"):
         for suffix in ("", ".cell", ".generation", "-wal", "-shm", "-journal"):
             assert main(["run", bundle, "--journal", journal, f"--{what}", f"{journal}{suffix}"]) == 2
-            assert f"the {what} would overwrite what the run reads" in capsys.readouterr().err
+            assert f"{journal}{suffix}: --{what} would overwrite what --journal writes" in capsys.readouterr().err
     both = str(tmp_path / "both")
     assert main(["run", bundle, "--trace", both, "--log", both]) == 2
-    assert "trace and log would be one file" in capsys.readouterr().err
+    assert "--log would overwrite what --trace writes" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 

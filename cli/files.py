@@ -1,0 +1,160 @@
+"""The files that a command line names: what is read, what is written, and that no output is written over either.
+
+An option says by its type which it is, and a command has nothing to remember: each file is compared with those named
+before it while the command line is read, so before anything is read or written. Two names are one file where the file
+system says so, over links of both kinds. What is written into a folder is named after what was found, and compared when
+that is known, before any of it is written (`refuse_to_overwrite`).
+
+Rejected: a list in each command of what it reads. The next option is missing in it, and a net is lost.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final
+
+import click
+
+CATALOGUE: Final = "catalogue:"
+NET_FILES: Final = (".firable.yaml", ".firable.yml")
+_NAMED: Final = "firable.files"  # where the context of a command keeps the files named so far
+
+
+def net_files(arguments: Sequence[str]) -> tuple[str, ...]:
+    """The arguments, with every folder replaced by the net files below it, in the order of their names.
+
+    A folder without a net file stays, for `load_net` to refuse.
+    """
+    found: list[str] = []
+    for argument in arguments:
+        found += [str(path) for path in nets_below(argument)] or [argument]
+    return tuple(found)
+
+
+def nets_below(argument: str) -> list[Path]:
+    """The net files of a project, sorted; none where the argument is no folder.
+
+    None is in hidden folders, nor in what is installed there, which has a catalogue.
+    """
+    found: list[Path] = []
+    if not is_folder(argument):
+        return found
+    for here, folders, files in os.walk(argument):
+        folders[:] = [one for one in folders if not one.startswith(".") and not Path(here, one, "pyvenv.cfg").exists()]
+        paths = (Path(here, one) for one in files if one.endswith(NET_FILES))
+        found += [path for path in paths if path.is_file()]
+    return sorted(found)
+
+
+def is_folder(argument: str) -> bool:
+    """Whether an argument names a folder."""
+    try:
+        return not argument.startswith(CATALOGUE) and Path(argument).is_dir()
+    except OSError:  # a name that no file can have
+        return False
+
+
+def journal_files(journal: str) -> tuple[str, ...]:
+    """The files of a journal, those that SQLite makes beside it among them."""
+    return tuple(f"{journal}{suffix}" for suffix in ("", ".cell", ".generation", "-wal", "-shm", "-journal"))
+
+
+def _read(argument: str) -> Iterable[str]:
+    """The files that are read where a file, a folder of nets or `catalogue:NAME` is named."""
+    if not argument.startswith(CATALOGUE):
+        return net_files([argument])
+    from firable.nets.catalogue import catalogue_names, catalogue_path
+
+    name = argument.removeprefix(CATALOGUE)
+    if name not in catalogue_names():
+        return ()
+    return str(catalogue_path(name)), str(catalogue_path(name).with_name(f"{name}.plant.yaml"))
+
+
+def _written(argument: str) -> Iterable[str]:
+    return () if argument == "-" else (argument,)
+
+
+def _later(_: str) -> Iterable[str]:
+    return ()
+
+
+class FileType(click.types.StringParamType):
+    """The type of options and arguments that name files: which those are, and whether they are written."""
+
+    def __init__(self, files: Callable[[str], Iterable[str]], *, is_written: bool) -> None:
+        self.files = files
+        self.is_written = is_written
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """The name as it is; raises `InputError` F1017 where an output would overwrite another file of the command."""
+        argument: str = super().convert(value, param, ctx)
+        if param is not None and ctx is not None:
+            named = _Named(param.opts[0], argument, self)
+            known: list[_Named] = ctx.meta.setdefault(_NAMED, [])
+            for other in known:
+                if self.is_written:
+                    _compare(named.by, named.files, other)
+                elif other.is_written:
+                    _compare(other.by, other.files, named)
+            known.append(named)
+        return argument
+
+
+READ: Final = FileType(_read, is_written=False)
+"""A file that is read; of nets, a folder or `catalogue:NAME` too."""
+WRITTEN: Final = FileType(_written, is_written=True)
+"""A file that is written, over what stands there; - is standard output."""
+FOLDER: Final = FileType(_later, is_written=True)
+"""A folder that files are written into, whose names are known later."""
+JOURNAL: Final = FileType(journal_files, is_written=True)
+"""The journal of a run, with what stands beside it."""
+MADE: Final = FileType(_later, is_written=True)
+"""A file that is written only where no other stands, as whoever makes it sees to."""
+
+
+def refuse_to_overwrite(files: Iterable[str]) -> None:
+    """Raise `InputError` F1017 where one of these files, which no option names, is read or is another output."""
+    written = tuple(files)
+    for other in click.get_current_context().meta.get(_NAMED, ()):
+        _compare("what is written there", written, other, "name another folder")
+
+
+@dataclass(frozen=True)
+class _Named:
+    """What one option or argument names."""
+
+    by: str
+    argument: str
+    type: FileType
+
+    @property
+    def is_written(self) -> bool:
+        return self.type.is_written
+
+    @cached_property
+    def files(self) -> tuple[str, ...]:
+        return tuple(self.type.files(self.argument))
+
+
+def _compare(by: str, files: Iterable[str], other: _Named, hint: str = "name another file") -> None:
+    from firable.nets.diagnostics import Diagnostic, InputError
+    from firable.nets.source import printable
+
+    for file in files:
+        if any(_is_same(file, one) for one in other.files):
+            another = "another " if other.by == by else ""
+            whom = f"{another}{other.by} writes" if other.is_written else "the command reads"
+            message = f"{printable(file)}: {by} would overwrite what {whom}"
+            raise InputError([Diagnostic("F1017", message, hint)])
+
+
+def _is_same(one: str, other: str) -> bool:
+    try:
+        return os.path.realpath(one) == os.path.realpath(other) or Path(one).samefile(other)
+    except (OSError, ValueError):  # no such file yet, or a name that no file can have, as is told of then
+        return False
