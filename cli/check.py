@@ -16,7 +16,7 @@ from firable.cli.choice import OneOf
 from firable.cli.evidence_files import is_evidence
 from firable.cli.files import FOLDER, READ, WRITTEN, net_files
 from firable.cli.loop import loop_report, machines_option, show_loop
-from firable.cli.net_files import demand_a_file
+from firable.cli.net_files import demand_a_net_file
 from firable.cli.options import (
     analysis_options,
     answer_all,
@@ -113,7 +113,7 @@ class _Asked:
     "loop_file",
     metavar="FILE",
     type=WRITTEN,
-    help="Write the net that NET and its --machines are together.",
+    help="Write the net that NET and its --machines are together, as a net file (*.firable.yaml).",
 )
 @page_option
 @click.option(
@@ -182,7 +182,7 @@ def _refuse_beside_machines() -> None:
         raise click.UsageError(f"{message}and check that file")
     if len(context.params["nets"]) > 1 and context.params["loop_file"] is not None:
         raise click.UsageError("--loop-net holds one loop: name one NET")
-    demand_a_file(context.params["loop_file"])
+    demand_a_net_file(context.params["loop_file"])
 
 
 def _report(argument: str, asked: _Asked, evidence_dir: str | None, *, many: bool) -> Report:

@@ -14,7 +14,7 @@ import click
 from firable.cli import text
 from firable.cli.evidence_files import is_evidence
 from firable.cli.files import CATALOGUE, READ
-from firable.cli.net_files import write_net
+from firable.cli.net_files import is_schema, schema_told, write_net
 from firable.cli.options import catalogue_file, load_net, write_folder
 from firable.cli.report import Report
 
@@ -152,6 +152,8 @@ def show_loop(report: Report, *, verbose: bool) -> None:
         click.echo(f"\n{loop['faults_not_asked']}")
     text.show_summary(report)
     for file in report.files:
-        if file != "-":
+        if is_schema(file):
+            click.echo(f"  {schema_told(file)}")
+        else:
             of = "evidence: firable verify" if is_evidence(file) else "the loop as a net file:"
             click.echo(f"  {of} {Path(file)}")

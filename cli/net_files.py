@@ -21,10 +21,24 @@ if TYPE_CHECKING:
 SCHEMA_FILE: Final = "net.schema.json"
 
 
-def demand_a_file(path: str | None) -> None:
-    """Raise `click.UsageError` where a net is to be written to standard output, where the report goes."""
+def demand_a_net_file(path: str | None) -> None:
+    """Raise `click.UsageError` where a net is to be written where nobody would look for one, or amid the report."""
+    from firable.nets.loading import TEXT_SUFFIXES
+
     if path == "-":
         raise click.UsageError("the net cannot go to standard output, where the report goes: name a file")
+    if path is not None and Path(path).suffix.lower() not in TEXT_SUFFIXES:
+        raise click.UsageError(f"'{path}' is not named like a net file: name a file *.firable.yaml")
+
+
+def is_schema(file: str) -> bool:
+    """Whether a file that a command has written is the schema beside a net file, by its name."""
+    return Path(file).name == SCHEMA_FILE
+
+
+def schema_told(file: str) -> str:
+    """The line that tells of a schema that was written."""
+    return f"written: {file}, by which editors complete and check it"
 
 
 def write_net(path: str, net: Net) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ import click
 
 from firable.cli import text
 from firable.cli.files import FOLDER, READ, WRITTEN
-from firable.cli.net_files import SCHEMA_FILE, demand_a_file, write_net
+from firable.cli.net_files import demand_a_net_file, is_schema, schema_told, write_net
 from firable.cli.options import (
     analysis_options,
     answer,
@@ -98,7 +98,7 @@ def refine(
     violates a condition is refused, with a firing sequence in its own names. `firable bundle DETAILED --conceptual NET`
     puts all this into the bundle, for `firable verify` to show again.
     """
-    demand_a_file(output)
+    demand_a_net_file(output)
     most = budget(max_markings, max_memory, max_seconds)
     make = with_page(lambda: _report(net, files, output, cell, confirm, most, evidence_dir), page)
     return answer("refine", format_, make, _show)
@@ -294,7 +294,7 @@ def _show(report: Report) -> None:
     for file in report.files:
         if file.endswith((".evidence.json", ".evidence.json.gz")):
             click.echo(f"  evidence: firable verify {file}")
-        elif file.endswith(SCHEMA_FILE):
-            click.echo(f"  written: {file}, by which editors complete and check it")
+        elif is_schema(file):
+            click.echo(f"  {schema_told(file)}")
         else:
             click.echo(f"  the detailed net is in {file}")

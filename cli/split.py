@@ -12,7 +12,7 @@ import click
 from firable.cli import text
 from firable.cli.files import FOLDER, READ, WRITTEN
 from firable.cli.finite import FiniteRange
-from firable.cli.net_files import demand_a_file, write_net, write_nets
+from firable.cli.net_files import demand_a_net_file, write_net, write_nets
 from firable.cli.options import (
     answer,
     formats_option,
@@ -63,7 +63,7 @@ _CONTROLLERS_MAX = 30  # told of in text; the JSON has them all
     "--output",
     metavar="FILE",
     type=WRITTEN,
-    help="Write the net with its new owners as a net file.",
+    help="Write the net with its new owners as a net file (*.firable.yaml).",
 )
 @click.option(
     "--subnets", "subnet_dir", metavar="DIR", type=FOLDER, help="Write the subnet of each controller as a net file."
@@ -104,7 +104,7 @@ def split(
         raise click.UsageError("--suggest proposes owners, and --own and --rules give them: leave one out")
     if output is not None and not by_rule and suggest is None:
         raise click.UsageError("-o writes the net with new owners: give them by --own or --rules, or --suggest them")
-    demand_a_file(output)
+    demand_a_net_file(output)
     asked = _Asked(own, rules, suggest, slack, max_seconds)
     return answer("split", format_, with_page(lambda: _report(net, asked, output, subnet_dir), page), _show)
 

@@ -440,16 +440,28 @@ def test_what_cannot_be_written_leaves_no_schema_behind(tmp_path: Path, capsys: 
     assert [path.name for path in tmp_path.iterdir()] == ["taken.firable.yaml"]
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["refine", "catalogue:conceptual_one_robot", "-o", "-"],
-        ["split", "catalogue:one_robot", "--suggest", "2", "-o", "-"],
-        ["check", "catalogue:one_robot", "--machines", "catalogue:one_robot", "--loop-net", "-"],
-    ],
+NET_WRITERS = (
+    ("refine", "catalogue:conceptual_one_robot", "-o"),
+    ("split", "catalogue:one_robot", "--suggest", "2", "-o"),
+    ("check", "catalogue:one_robot", "--machines", "catalogue:one_robot", "--loop-net"),
 )
-def test_a_net_never_goes_amid_the_report(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(arguments) == 2
+
+
+@pytest.mark.parametrize("arguments", NET_WRITERS)
+def test_a_net_never_goes_amid_the_report(arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*arguments, "-"]) == 2
     printed = capsys.readouterr()
     assert printed.out == ""
     assert "the net cannot go to standard output, where the report goes: name a file" in printed.err
+
+
+@pytest.mark.parametrize("arguments", NET_WRITERS)
+def test_a_net_file_is_written_under_no_name_by_which_it_is_not_read(
+    arguments: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("net.txt", "net", "net.pnml"):
+        assert main([*arguments, name]) == 2
+        said = f"'{name}' is not named like a net file: name a file *.firable.yaml"
+        assert said in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

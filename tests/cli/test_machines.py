@@ -98,9 +98,11 @@ def test_the_json_of_a_loop_fits_the_published_schema(wrong_plant: str, capsys: 
 def test_the_loop_is_written_as_a_net_that_is_checked_like_any_other(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = tmp_path / "loop.firable.yaml"
+    path, schema = tmp_path / "loop.firable.yaml", tmp_path / "net.schema.json"
     assert main(["check", CELL, "--machines", PLANT, "--loop-net", str(path)]) == 0
-    assert f"the loop as a net file: {path}" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert f"  the loop as a net file: {path}\n  written: {schema}, by which editors complete and check it\n" in told
+    assert told.count("as a net file") == 1
     assert main(["check", str(path), "--query", "AG not (plant.accident or plant.overrun)"]) == 1
     told = capsys.readouterr().out
     assert "746 markings, 1,976 edges" in told
