@@ -129,6 +129,8 @@ def draw(
         if value is not None and what not in _OF[name]:
             wanted = " or ".join(f"--what {one}" for one in _OF[name])
             raise click.UsageError(f"--{name.replace('_', '-')} is of {wanted}, not of --what {what}")
+    if output != "-" and not output.lower().endswith(".svg"):
+        raise click.UsageError(f"a picture is SVG, and '{output}' is not named like one: name a file *.svg")
     if marking is not None and trace is not None:
         raise click.UsageError("--marking and --trace both say which tokens to show: leave one out")
     loaded = load_net(net).net

@@ -140,6 +140,8 @@ def test_what_is_no_net_file_is_refused_at_once(tmp_path: Path, capsys: pytest.C
         (["draw", "catalogue:one_robot", "--discipline", "step"], "--discipline is of --what graph, not of --what net"),
         (["draw", "catalogue:one_robot", "--what", "graph", "--marking", "robot.free"], "--marking is of --what net"),
         (["draw", "catalogue:one_robot", "--what", "strip"], "add --trace FILE"),
+        (["draw", "catalogue:one_robot", "-o", "net.png"], "'net.png' is not named like one: name a file *.svg"),
+        (["draw", "catalogue:one_robot", "-o", "net"], "'net' is not named like one: name a file *.svg"),
         (["draw", "catalogue:one_robot", "--collapse", "robt"], "no place and no controller 'robt'"),
         (["draw", "catalogue:one_robot", "--what", "graph", "--keep-layout"], "--keep-layout is of --what net"),
         (["refine", "catalogue:conceptual_one_robot", "-o", "-"], "cannot go to standard output"),
@@ -157,11 +159,13 @@ def test_an_output_that_cannot_be_written_leaves_nothing_behind(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").write_text("kept")
-    (tmp_path / "folder").mkdir()
-    monkeypatch.chdir(tmp_path / "folder")
-    for output in (str(tmp_path / "no" / "x"), str(tmp_path / "file" / "x"), str(tmp_path / "folder"), ".", "", "/"):
+    (tmp_path / "folder.svg").mkdir()
+    monkeypatch.chdir(tmp_path / "folder.svg")
+    for output in (str(tmp_path / "no" / "x.svg"), str(tmp_path / "file" / "x.svg"), str(tmp_path / "folder.svg")):
         for command in (["draw", "catalogue:one_robot"], ["bundle", "catalogue:one_robot"]):
             assert "error[F1017]" in refused(capsys, *command, "-o", output)
+    for output in (".", "", "/"):
+        assert "error[F1017]" in refused(capsys, "bundle", "catalogue:one_robot", "-o", output)
     said = refused(capsys, "convert", "catalogue:one_robot", "-o", str(tmp_path / "no" / "x.pnml"))
     assert "error[F1017]" in said
     said = refused(capsys, "refine", "catalogue:conceptual_one_robot", "-o", str(tmp_path / "no" / "x.firable.yaml"))
@@ -169,9 +173,9 @@ def test_an_output_that_cannot_be_written_leaves_nothing_behind(
     for option, maker in (("--trace-dir", "check"), ("--smt-dir", "prove")):
         said = refused(capsys, maker, "catalogue:one_robot_mc_late", option, str(tmp_path / "file"))
         assert "error[F1017]" in said
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "folder"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "folder.svg"]
     assert (tmp_path / "file").read_text() == "kept"
-    assert list((tmp_path / "folder").iterdir()) == []
+    assert list((tmp_path / "folder.svg").iterdir()) == []
 
 
 @pytest.mark.parametrize(
