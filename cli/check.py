@@ -8,7 +8,6 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.core import ParameterSource
 
 from firable.analysis.methods import Method
 from firable.cli import text
@@ -22,6 +21,7 @@ from firable.cli.options import (
     answer_all,
     budget,
     formats_option,
+    is_given,
     load_net,
     page_option,
     with_page,
@@ -175,8 +175,7 @@ def _refuse_beside_machines() -> None:
     """Refuse what is asked of a net and not of a loop: the loop is a net, once it is written."""
     context = click.get_current_context()
     alone = ("discipline", "method", "trace_dir", "structure", "query_file", "query_texts")
-    given = [name for name in alone if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
-    if given:
+    if given := [name for name in alone if is_given(name)]:
         option = {"query_texts": "query", "query_file": "queries"}.get(given[0], given[0])
         message = f"--{option.replace('_', '-')} does not go with --machines: write the loop by --loop-net FILE, "
         raise click.UsageError(f"{message}and check that file")

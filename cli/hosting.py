@@ -15,6 +15,7 @@ from firable.cli import text
 from firable.cli.files import JOURNAL, READ
 from firable.cli.finite import FiniteRange
 from firable.cli.log import told_aside
+from firable.cli.options import is_given
 from firable.cli.report import Report
 from firable.cli.watched import AFTER_A_FAULT_OF_A_HOST, machines_verdict, show_coalesced
 from firable.nets.source import printable
@@ -66,6 +67,8 @@ class HostOptions:
             "--join": self.join,
             "--tls": self.tls,
             "--serial": self.serial,
+            "--baud": is_given("baud"),
+            "--lease": is_given("lease"),
             "--dry-run": self.dry_run is not None,
         }
         if names := [name for name, value in given.items() if value]:
@@ -252,6 +255,8 @@ def _link(bundle: Bundle, machines: tuple[str, ...], options: HostOptions) -> tu
         if options.listen or options.join or options.tls:
             raise click.UsageError("--serial is one link, and --listen, --join and --tls are of another: give one")
         return make_link(bundle, machines, SerialLine(options.serial, options.baud, options.lease)), ()
+    if is_given("baud"):
+        raise click.UsageError("--baud is of a serial line: name it with --serial")
     if not options.listen and not options.join:
         raise click.UsageError("say with --listen, --join or --serial how this host is linked to the others")
     secured = [address for address in (*options.listen, *options.join) if address.startswith("tls/")]

@@ -108,6 +108,8 @@ def _sent(binding: Binding, names: tuple[str, ...], of: str | None) -> list[Plac
     from firable.nets.diagnostics import InputError
 
     if not names:
+        if of is not None:
+            raise click.UsageError("--net is about the commands that are sent: name one with --send")
         return []
     if of is None:
         raise click.UsageError("say with --net whose commands --send is about")

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
+from click.core import ParameterSource
 
 from firable.cli.choice import OneOf
 from firable.cli.files import CATALOGUE, READ, WRITTEN, is_folder, nets_below, refuse_to_overwrite
@@ -94,6 +95,11 @@ def with_page(make: Callable[[], Report], path: str | None) -> Callable[[], Repo
         return report
 
     return make_both
+
+
+def is_given(name: str) -> bool:
+    """Whether the command line gives a parameter, which has a default, a value of its own."""
+    return click.get_current_context().get_parameter_source(name) is ParameterSource.COMMANDLINE
 
 
 def analysis_options(command: F) -> F:

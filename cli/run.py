@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.core import ParameterSource
 
 from firable.cli import text
 from firable.cli.bound_run import run_bound_of, show_bound
@@ -17,7 +16,7 @@ from firable.cli.files import CATALOGUE, READ, WRITTEN
 from firable.cli.hosting import HostOptions, host_options, run_host_of, show_host
 from firable.cli.log import log_option, log_to, told_aside
 from firable.cli.operate import ServeOptions, serve_options
-from firable.cli.options import answer, catalogue_file, format_option, refuse_a_net
+from firable.cli.options import answer, catalogue_file, format_option, is_given, refuse_a_net
 from firable.cli.report import Report
 from firable.cli.sign import trust_option
 from firable.cli.watched import machines_verdict, show_coalesced
@@ -124,9 +123,12 @@ def run(
     options = HostOptions(**host)
     if not options.is_one_of_several:
         options.refuse_alone()
+    for name, is_said in (("--say", say), ("--resume", options.resume)):
+        if is_said and options.journal is None:
+            raise click.UsageError(f"{name} is of a run that is taken up: name its --journal")
 
     served = ServeOptions(serve, token_file, serve_tls, operators, open_)
-    if open_ and click.get_current_context().get_parameter_source("speed") is ParameterSource.DEFAULT:
+    if open_ and not is_given("speed"):
         speed = "1"
     is_simulated = options.bind is None and not options.is_one_of_several
     if (serve is not None or open_) and _SPEEDS[speed] is None and is_simulated:
@@ -158,7 +160,7 @@ def run(
             stepped = stepping(pace, to_stderr=format_ == "json")
         with log_to(log) as told_to, stepped as operator:
             if options.is_one_of_several:
-                said = _said(loaded.net, say, options.journal)
+                said = _said(loaded.net, say)
                 return run_host_of(
                     bundle, loaded, options, trace, said, service, told_to, plant=model, watch=Watch(watch)
                 )
@@ -170,7 +172,7 @@ def run(
                     trace,
                     operator,
                     options.journal,
-                    _said(loaded.net, say, options.journal),
+                    _said(loaded.net, say),
                     resume=options.resume,
                     plant=model,
                     watch=Watch(watch),
@@ -187,7 +189,7 @@ def run(
                     trace_path=trace,
                     journal_path=options.journal,
                     resume=options.resume,
-                    said=_said(loaded.net, say, options.journal),
+                    said=_said(loaded.net, say),
                     watch=Watch(watch),
                     service=service,
                     log=told_to,
@@ -224,13 +226,11 @@ def _if_not_reported(tell: Callable[[str, str], None], kind: str, sentence: str)
         tell(kind, sentence)
 
 
-def _said(net: Net, say: tuple[str, ...], journal: str | None) -> dict[str, Answer]:
+def _said(net: Net, say: tuple[str, ...]) -> dict[str, Answer]:
     """What the operator says of commands, by place."""
     from firable.executor.protocol.commands import SAID
     from firable.nets.diagnostics import with_meant
 
-    if say and journal is None:
-        raise click.UsageError("--say is of a run that is taken up: name its --journal")
     said: dict[str, Answer] = {}
     for option in say:
         place, _, word = option.partition("=")

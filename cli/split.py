@@ -16,6 +16,7 @@ from firable.cli.net_files import demand_a_net_file, write_net, write_nets
 from firable.cli.options import (
     answer,
     formats_option,
+    is_given,
     load_net,
     net_argument,
     page_option,
@@ -102,6 +103,8 @@ def split(
     by_rule = bool(own) or rules is not None
     if by_rule and suggest is not None:
         raise click.UsageError("--suggest proposes owners, and --own and --rules give them: leave one out")
+    if is_given("slack") and suggest is None:
+        raise click.UsageError("--slack is of owners that are proposed: add --suggest N")
     if output is not None and not by_rule and suggest is None:
         raise click.UsageError("-o writes the net with new owners: give them by --own or --rules, or --suggest them")
     demand_a_net_file(output)

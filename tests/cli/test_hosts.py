@@ -25,6 +25,12 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 MISTAKES: dict[str, tuple[list[str], str]] = {
     "an option of a host alone": (["--join", "tcp/127.0.0.1:1"], "--join is for a host among others"),
+    "a lease of nobody": (["--lease", "3"], "--lease is for a host among others"),
+    "a rate of no line": (["--baud", "9600"], "--baud is for a host among others"),
+    "a rate of no serial line": (
+        ["--controller", "robot", "--dry-run", "1", "--join", "tcp/[::1]:1", "--baud", "9600"],
+        "--baud is of a serial line",
+    ),
     "no link": (["--controller", "robot", "--dry-run", "1"], "--listen, --join or --serial"),
     "two links": (["--controller", "robot", "--dry-run", "1", "--serial", "x", "--join", "tcp/[::1]:1"], "one link"),
     "no machines": (["--controller", "robot", "--join", "tcp/127.0.0.1:1"], "--bind"),

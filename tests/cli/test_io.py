@@ -143,6 +143,13 @@ def test_looking_writes_nothing_and_sending_by_hand_is_for_what_the_binding_allo
     assert cell.line_with(" R ").strip().endswith("R MOVE to=HOME")
 
 
+def test_a_net_whose_commands_are_not_sent_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bind = tmp_path / "c.bind.yaml"
+    bind.write_text(binding_text(NET, {"modbus": str(free_port())}, SENSORS))
+    assert main(["io", str(bind), "--once", "--net", "catalogue:one_robot"]) == 2
+    assert "--net is about the commands that are sent: name one with --send" in capsys.readouterr().err
+
+
 def test_what_cannot_be_read_is_told_and_unknown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bind = tmp_path / "c.bind.yaml"
     text = binding_text(NET, {"modbus": str(free_port())}, SENSORS)

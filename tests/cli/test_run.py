@@ -261,13 +261,14 @@ def test_a_trace_or_a_log_in_a_file_of_the_journal_is_refused(
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--say", "mc.fix=done"), "name its --journal"),
+        (("--say", "mc.fix=done"), "--say is of a run that is taken up: name its --journal"),
+        (("--resume",), "--resume is of a run that is taken up: name its --journal"),
         (("--say", "mc.fi=done", "--journal", "j"), "did you mean 'mc.fix'?"),
         (("--say", "x=done", "--journal", "j"), "no place 'x' sends a command\n"),
         (("--say", "mc.fix=perhaps", "--journal", "j"), "say done, working, not-received"),
     ],
 )
-def test_a_word_on_no_command_is_refused(
+def test_a_word_on_no_command_or_of_no_run_that_is_taken_up_is_refused(
     options: tuple[str, ...], words: str, bundle: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["run", bundle, *options]) == 2

@@ -136,6 +136,7 @@ def test_rules_give_a_net_of_pnml_its_owners(tmp_path: Path, capsys: pytest.Capt
         (["--own", "a=*", "--suggest", "2"], "leave one out"),
         (["-o", "x.yaml"], "give them by --own or --rules"),
         (["--suggest", "0"], "Invalid value"),
+        (["--slack", "0.1"], "--slack is of owners that are proposed: add --suggest N"),
     ],
 )
 def test_a_wrong_command_line_says_what_is_wrong(
