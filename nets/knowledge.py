@@ -279,7 +279,9 @@ def _keeping(subnet: Net) -> Callable[[Transition], bool]:
         inputs = set(part.inputs)
         lasting = all(
             # A timer falls by itself when its controller restarts, a completion never.
-            subnet.signal(gate.signal).kind is SignalKind.COMPLETION and gate.wanted and senders[gate.signal] <= inputs
+            subnet.signal(gate.signal).kind is SignalKind.COMPLETION
+            and gate.wanted
+            and senders.get(gate.signal, {""}) <= inputs  # of one that no place waits for, nothing is claimed
             for gate in part.external
         )
         return alone and lasting and not shows_what_it_clears(part) and not is_closed_but_for_a_signal(part)

@@ -93,6 +93,8 @@ def check_verdicts_on_the_net(examination: Examination, answers: Answers, timeou
         raise NotShownError(f"the evidence on '{name}' belongs to no verdict of the bundle", "evidence", name)
     for _, file in (one for waiting in shown.questions.values() for one in waiting):
         raise NotShownError(f"'{file}' answers a question that no verdict asks", "evidence", file)
+    for file in (file for file, left in shown.order.items() if left):
+        raise NotShownError(f"'{file}' has a record that claims nothing", "evidence", file)
 
 
 def answers_in(examination: Examination, file: str) -> dict[str, bool]:

@@ -22,7 +22,7 @@ from itertools import count
 from firable.decompose.verification.refusal import NotShownError
 from firable.nets.decomposition import ArbitrationGroup, Coordinated, Decomposition, Part
 from firable.nets.diagnostics import InputError
-from firable.nets.net import ArbitrationRule, Net, Place, Signal, Transition
+from firable.nets.net import ArbitrationRule, Net, Place, Signal, SignalKind, Transition
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,10 @@ class Cut:
             if item.owner is None:
                 raise NotShownError(f"'{item.name}' has no owner")
             found[item.name] = item.owner
+        awaited = {place.completion for place in self.net.places}
+        for signal in self.net.signals:
+            if signal.kind is SignalKind.COMPLETION and signal.name not in awaited:
+                raise NotShownError(f"'{signal.name}' is the completion of no command: its gates never open")
         return found
 
     @cached_property
@@ -69,6 +73,8 @@ class Cut:
     def numbers(self) -> dict[str, int | None]:
         """The number of each transition: its own; a global one without any has the next that no other one has."""
         taken = {t.number for t in self.net.transitions}
+        if any(number is not None and number < 0 for number in taken):
+            raise NotShownError("a row has a negative number")
         free = (n for n in count(1) if n not in taken)
         return {
             t.name: next(free) if t.number is None and self.is_global(t.name) else t.number
@@ -223,6 +229,9 @@ class Cut:
     def groups(self) -> tuple[ArbitrationGroup, ...]:
         """The arbitration group of each component."""
         of_arbiter = {name: arbiter for arbiter in self.net.arbiters for name in arbiter.among}
+        competing = {name for members in self.components for name in members}
+        if idle := next((name for name in of_arbiter if name not in competing), None):
+            raise NotShownError(f"'{of_arbiter[idle].name}' decides of '{idle}', which is in no conflict")
         groups = []
         for number, members in enumerate(self.components, 1):
             arbiters = list(dict.fromkeys(of_arbiter[name] for name in members if name in of_arbiter))
@@ -328,6 +337,7 @@ def _differences(cut: Cut, decomposition: Decomposition) -> Iterator[NotShownErr
             "arbiters",
             "properties",
             "description",
+            "expected",
         ):
             if getattr(subnet, kind) != getattr(wanted, kind):
                 yield NotShownError(

@@ -127,7 +127,7 @@ class Laws:
                     f"the hand of {name} is at {position}",
                     marked=position == machine.hand,
                 )
-            if machine.hand is not None or any(isinstance(action, Carry) for action in machine.commands.values()):
+            if machine.holds:
                 yield from holding(name)
         for station in self.model.stations:
             yield from holding(station)

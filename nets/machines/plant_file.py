@@ -145,6 +145,11 @@ class Machine(_Model):
     positions: dict[Name, Name | None] = {}
     commands: dict[Name, Action]
 
+    @property
+    def holds(self) -> bool:
+        """Whether it can hold a workpiece: in its hand, or while it carries one."""
+        return self.hand is not None or any(isinstance(action, Carry) for action in self.commands.values())
+
 
 class Arrivals(_Model):
     """Where workpieces come from: one each `every_s`, as soon as the station is empty."""
@@ -304,6 +309,9 @@ def _inconsistencies(model: PlantModel) -> Iterator[tuple[Path, str, str]]:
         for key, machine_seen in (("holding", sensor.holding), ("acknowledges", sensor.acknowledges)):
             if machine_seen is not None and machine_seen not in model.machines:
                 yield ("sensors", name, key), f"there is no machine '{machine_seen}'", "see `machines`"
+        if sensor.holding in model.machines and not model.machines[sensor.holding].holds:
+            hint = "a machine with `hand`, or with a command that does `carry`, holds workpieces"
+            yield ("sensors", name, "holding"), f"'{sensor.holding}' never holds anything", hint
 
 
 def misfits(model: PlantModel, net: Net) -> tuple[Diagnostic, ...]:

@@ -298,6 +298,7 @@ def test_machine_or_command_that_the_plant_lacks_is_said_at_the_table_to_add_it_
         ("    hand: HOME\n", "", 10, "'R' has no hand"),
         ("{holding: R}", "{holding: Q}", 26, "there is no machine 'Q'"),
         ("{holding: R}", "{}", 26, "a sensor sees one thing"),
+        ("{holding: R}", "{holding: M}", 26, "'M' never holds anything"),
         ("[entry, table, exit]", "[entry, table, exit, table]", 3, "'table' stands here a second time"),
     ],
 )
