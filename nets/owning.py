@@ -2,8 +2,9 @@
 
 An owned thing is named `controller.thing`, so owning renames it wherever it stands: in arcs, gates, completions,
 timers and formulas. The name within the controller is the one it had before, without its former owner; where two of one
-controller would then have the same name, the former owner stays in it (`robot_free`, `mc_free`). Nothing else changes:
-the net with owners has the same markings under other names.
+controller would then have the same name, the former owner stays in it (`robot_free`, `mc_free`). The description of a
+fault transition names the completion, and follows it. Nothing else changes: the net with owners has the same markings
+under other names.
 
 Rejected: owners beside the names, as a table of their own. A reader of `robot.free` sees whose it is, and so does a
 diff.
@@ -14,10 +15,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
+from itertools import starmap
 from typing import Any
 
 from firable.nets.formula import Count, Holds
 from firable.nets.net import Controller, Net, Place, Signal, Transition
+from firable.nets.time_limits import fault_transition
 
 
 def with_owners(net: Net, owner_of: Mapping[str, str], controllers: Sequence[Controller]) -> Net:
@@ -42,24 +45,29 @@ def with_owners(net: Net, owner_of: Mapping[str, str], controllers: Sequence[Con
     def new(names: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(named[name] for name in names)
 
-    def moved(t: Transition) -> Transition:
+    places = tuple(
+        replace(
+            place,
+            name=named[place.name],
+            owner=owner_of[place.name],
+            completion=None if place.completion is None else named[place.completion],
+            within=None if place.within is None else replace(place.within, timer=named[place.within.timer]),
+        )
+        for place in net.places
+    )
+    told = {t: (_told(net.places[p]), _told(places[p])) for p, t in net.fault_transitions.items()}
+
+    def moved(index: int, t: Transition) -> Transition:
         external = tuple(replace(gate, signal=named[gate.signal]) for gate in t.external)
         gates = new(t.permissive), new(t.inhibitive)
-        return Transition(t.name, new(t.inputs), new(t.outputs), *gates, external, t.number, t.description)
+        before, after = told.get(index, ("", ""))
+        description = after if t.description == before else t.description
+        return Transition(t.name, new(t.inputs), new(t.outputs), *gates, external, t.number, description)
 
     return Net(
         net.name,
-        tuple(
-            replace(
-                place,
-                name=named[place.name],
-                owner=owner_of[place.name],
-                completion=None if place.completion is None else named[place.completion],
-                within=None if place.within is None else replace(place.within, timer=named[place.within.timer]),
-            )
-            for place in net.places
-        ),
-        tuple(map(moved, net.transitions)),
+        places,
+        tuple(starmap(moved, enumerate(net.transitions))),
         tuple(replace(signal, name=named[signal.name], owner=owner_of[signal.name]) for signal in net.signals),
         tuple(controllers),
         net.arbiters,
@@ -67,6 +75,11 @@ def with_owners(net: Net, owner_of: Mapping[str, str], controllers: Sequence[Con
         net.description,
         net.expected,
     )
+
+
+def _told(place: Place) -> str:
+    """The description of the fault transition of a place, as its time limit gives it."""
+    return fault_transition(place, "", "").description
 
 
 def _renamed(term: Any, named: Callable[[str], str]) -> Any:

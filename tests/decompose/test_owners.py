@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.examples import examples
 from support.owned_nets import owned_nets
+from support.timed_nets import timed_nets
 
 from firable.analysis.deadline import Deadline
 from firable.analysis.spaces.equivalence import isomorphic
@@ -21,10 +22,20 @@ from firable.decompose.splitting.hypergraph import Hypergraph, hypergraph
 from firable.decompose.splitting.partitioning import partition
 from firable.decompose.splitting.rules import owned_by_rules, read_rules, rules_of_options
 from firable.decompose.splitting.suggesting import suggest
-from firable.nets.catalogue import catalogue_net, family_net
+from firable.nets.catalogue import catalogue_names, catalogue_net, family_net
 from firable.nets.diagnostics import InputError
 from firable.nets.joining import join
-from firable.nets.net import Command, Controller, ExternalGate, Net, Place, Signal, SignalKind, Transition
+from firable.nets.net import (
+    Command,
+    Controller,
+    ExternalGate,
+    Net,
+    Place,
+    Signal,
+    SignalKind,
+    TimeLimit,
+    Transition,
+)
 from firable.nets.owning import with_owners
 from firable.nets.printing import format_net, in_file_order
 from firable.nets.text import parse_net
@@ -188,6 +199,45 @@ def test_owners_of_the_file_are_compared_with() -> None:
 def test_proposed_owners_are_written_as_a_net_file() -> None:
     net = suggest(catalogue_net("one_robot"), 4).net
     assert parse_net(format_net(net)) == in_file_order(net)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4])
+@pytest.mark.parametrize("name", [name for name in catalogue_names() if catalogue_net(name).fault_transitions])
+def test_proposed_owners_of_a_timed_net_are_written_as_a_net_file(name: str, n: int) -> None:
+    net = suggest(catalogue_net(name), n, slack=2.0).net
+    assert parse_net(format_net(net)) == in_file_order(net)
+
+
+@given(timed_nets(), st.lists(st.sampled_from("cd"), min_size=3, max_size=3))
+@examples(25)
+def test_a_timed_net_whose_controllers_are_joined_is_written_as_a_net_file(net: Net, joined: list[str]) -> None:
+    new = dict(zip((controller.name for controller in net.controllers), joined, strict=False))
+    items: list[Place | Signal] = [*net.places, *net.signals]
+    owners = {item.name: new[item.owner] for item in items if item.owner}
+    owned = with_owners(net, owners, [Controller(name) for name in "cd"])
+    assert parse_net(format_net(owned)) == in_file_order(owned)
+
+
+def test_time_limits_of_one_name_keep_the_former_owners_of_their_places() -> None:
+    net = parse_net("""firable: 1
+cell: two
+controllers:
+  a: {start: free, places: {free: , go: {send: {machine: A, command: GO}, until: there, within: 1s}}}
+  b: {start: free, places: {free: , go: {send: {machine: B, command: GO}, until: there, within: 2s}}}
+  c: {start: go, places: {go: }}
+transitions:
+  a: {from: a.free, to: a.go}
+  b: {from: b.free, to: b.go}
+""")
+    both = owned_by_rules(net, {"m": ["a.*", "b.*"], "n": ["c.*"]})
+    assert [place.within and place.within.timer for place in both.places] == [
+        None, "m.a_go_overdue", None, None, "m.b_go_overdue", None, None
+    ]  # fmt: skip
+    one = owned_by_rules(net, {"m": ["a.*", "c.*"], "n": ["b.*"]})
+    assert one.place("m.a_go").within == TimeLimit(1000, "m.go_overdue")
+    assert one.transition("a.go_timeout").description == "m.there has not come within 1s"
+    for owned in (both, one):
+        assert parse_net(format_net(owned)) == in_file_order(owned)
 
 
 def test_without_time_nothing_is_called_optimal(monkeypatch: pytest.MonkeyPatch) -> None:
