@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import signal
 import time
-from collections.abc import Callable, Sequence
-from functools import cache, partial
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
+from functools import cache
+from itertools import takewhile
 from typing import TYPE_CHECKING
 
 import click
@@ -15,6 +19,9 @@ from firable.cli.options import answer, format_option, load_net
 from firable.cli.report import Report
 
 if TYPE_CHECKING:
+    from concurrent.futures import Future
+    from multiprocessing.synchronize import Event
+
     from firable.executor.simulation.campaign import Campaign, Run
     from firable.executor.simulation.judge import Subject
     from firable.nets.verdict import Verdict
@@ -90,21 +97,24 @@ def _report(argument: str, runs: Sequence[Run], jobs: int, is_text: bool) -> Rep
     subject = _subjects(argument)  # an input that cannot be split is refused here
     started = time.monotonic()
     done = _campaign(argument, runs, jobs)
+    if not done.runs:
+        raise KeyboardInterrupt  # before anything is known
     if is_text and len(runs) > 1:
         seconds = time.monotonic() - started
         click.echo(f"{done.runs:,} runs in {seconds:.1f} s: {done.runs / max(seconds, 1e-3):,.0f} a second", err=True)
     if done.failed and len(runs) > 1:
-        first = done.failed[0]
-        shorter = shrunk(subject(first.run.seed), first)
-        # Where seeds draw nets, another seed may be of another net: then the first run is shown as it was.
-        if subject(shorter.run.seed) is subject(first.run.seed):
-            done.failed[0] = shorter
+        with suppress(KeyboardInterrupt):  # who does not wait is shown the run as it was
+            first = done.failed[0]
+            shorter = shrunk(subject(first.run.seed), first)
+            # Where seeds draw nets, another seed may be of another net: then the first run is shown as it was.
+            if subject(shorter.run.seed) is subject(first.run.seed):
+                done.failed[0] = shorter
     net = subject(done.failed[0].run.seed if done.failed else runs[0].seed).net
     return Report(
         "rehearse",
         argument,
         net,
-        (_verdict(argument, done),),
+        (_verdict(argument, done, len(runs)),),
         run={
             "runs": done.runs,
             "counts": dict(sorted(done.counts.items())),
@@ -134,42 +144,77 @@ def _subjects(argument: str) -> Callable[[int], Subject]:
     return lambda _: subject
 
 
-def _part(argument: str, runs: Sequence[Run]) -> Campaign:
+def _part(argument: str, runs: Iterable[Run]) -> Campaign:
     from firable.executor.simulation.campaign import campaign
 
     return campaign(_subjects(argument), runs)
 
 
 def _campaign(argument: str, runs: Sequence[Run], jobs: int) -> Campaign:
-    from concurrent.futures import ProcessPoolExecutor
-
+    """What the runs come to; or those until Ctrl-C, or until enough of them have failed."""
     from firable.executor.simulation.campaign import Campaign
 
     chunks = [runs[i : i + _CHUNK] for i in range(0, len(runs), _CHUNK)]
-    part = partial(_part, argument)
     done = Campaign()
-    if jobs == 1:
-        for chunk in chunks:
-            done.join(part(chunk))
-            if len(done.failed) >= _FAILURES_MAX:
-                break
+    if jobs > 1:
+        _share(argument, chunks, jobs, done)
         return done
-    with ProcessPoolExecutor(jobs) as pool:
-        for found in pool.map(part, chunks):
-            done.join(found)
+    with suppress(KeyboardInterrupt):
+        for chunk in chunks:
+            for run in chunk:
+                done.join(_part(argument, [run]))
             if len(done.failed) >= _FAILURES_MAX:
-                pool.shutdown(cancel_futures=True)
                 break
     return done
 
 
-def _verdict(argument: str, done: Campaign) -> Verdict:
+_stopped: Event
+"""In a process that shares the runs: whether it is to begin no more of them."""
+
+
+def _begin(stopped: Event) -> None:
+    """Begin such a process; Ctrl-C, which a terminal sends to all of them, is for the first one to hear."""
+    global _stopped
+    _stopped = stopped
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _part_of_all(argument: str, runs: Sequence[Run]) -> Campaign:
+    return _part(argument, takewhile(lambda _: not _stopped.is_set(), runs))
+
+
+def _share(argument: str, chunks: Sequence[Sequence[Run]], jobs: int, done: Campaign) -> None:
+    """Let several processes share the runs, and join what they come to in the order of the chunks."""
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import Event
+
+    stopped = Event()
+    with ProcessPoolExecutor(jobs, initializer=_begin, initargs=(stopped,)) as pool:
+        waiting: deque[Future[Campaign]] = deque()
+        try:
+            waiting.extend(pool.submit(_part_of_all, argument, chunk) for chunk in chunks)
+            while waiting and len(done.failed) < _FAILURES_MAX:
+                waiting[0].result()
+                done.join(waiting.popleft().result())
+        except KeyboardInterrupt:
+            stopped.set()
+        pool.shutdown(cancel_futures=True)
+        for begun in waiting if stopped.is_set() else ():
+            if not begun.cancelled():
+                done.join(begun.result())
+
+
+def _verdict(argument: str, done: Campaign, n_asked: int) -> Verdict:
     from firable.nets.verdict import Status, Verdict
 
     method = "simulation from seeds, judged by the reference player"
     what = "trace of the net, and goes on when everything is mended"
     if not done.failed:
-        return Verdict("rehearsal", Status.PROVED, f"each of {text.counted(done.runs, 'run')} is a {what}", method)
+        statement = f"each of {text.counted(done.runs, 'run')} is a {what}"
+        if done.runs < n_asked:
+            bound = f"{text.counted(done.runs, 'run')} of {n_asked:,}; interrupted"
+            return Verdict("rehearsal", Status.UNKNOWN, statement, method, bound=bound)
+        return Verdict("rehearsal", Status.PROVED, statement, method)
     worst = done.failed[0]
     statement = f"each run is a {what}; of {text.counted(done.runs, 'run')} not: {len(done.failed)}"
     hint = f"{worst.kind}: {worst.message}\n{worst.command(argument)}"

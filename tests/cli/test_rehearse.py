@@ -1,8 +1,11 @@
 """`firable rehearse`: what it says of runs that pass and of one that fails, and the mistakes of its users."""
 
 import json
+import os
+import signal
 from dataclasses import replace
 from importlib.resources import files
+from multiprocessing import active_children
 from pathlib import Path
 
 import jsonschema
@@ -13,6 +16,8 @@ from firable.analysis.check import check
 from firable.cli.main import main
 from firable.cli.rehearse import _subjects
 from firable.decompose.bundling import make_bundle
+from firable.executor.simulation.campaign import Failed, Passed, Run
+from firable.executor.simulation.judge import Subject
 from firable.executor.simulation.world import Machines
 from firable.nets.bundle import write_bundle
 from firable.nets.catalogue import catalogue_net
@@ -42,6 +47,64 @@ def test_the_report_is_of_the_schema_and_holds_no_measured_time(capsys: pytest.C
     document = json.loads(documents[0])
     jsonschema.validate(document, SCHEMA)
     assert document["reports"][0]["run"]["runs"] == 60
+
+
+@pytest.mark.parametrize("before", [0, 7])
+def test_ctrl_c_shows_what_the_runs_until_then_came_to(
+    before: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rehearsed = firable.executor.simulation.campaign.rehearse
+
+    def rehearse(subject: Subject, run: Run, machines: Machines) -> Passed | Failed:
+        if run.seed == before:
+            raise KeyboardInterrupt
+        return rehearsed(subject, run, machines)
+
+    monkeypatch.setattr(firable.executor.simulation.campaign, "rehearse", rehearse)
+    assert main(["rehearse", "drawn", "--seeds", "1000"]) == 3
+    said = capsys.readouterr()
+    if before:
+        assert "? unknown   rehearsal  each of 7 runs is a trace of the net" in said.out
+        assert "reached: 7 runs of 1,000; interrupted" in said.out
+        assert "7 runs in" in said.err
+    else:
+        assert (said.out, said.err.strip()) == ("", "interrupted: nothing is known yet")
+
+
+def test_ctrl_c_ends_all_processes_and_shows_what_their_runs_came_to(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rehearsed, first = firable.executor.simulation.campaign.rehearse, os.getpid()
+
+    def rehearse(subject: Subject, run: Run, machines: Machines) -> Passed | Failed:
+        if run.seed == 70:
+            os.kill(first, signal.SIGINT)
+            os.kill(os.getpid(), signal.SIGINT)  # a terminal sends it to all
+        return rehearsed(subject, run, machines)
+
+    monkeypatch.setattr(firable.executor.simulation.campaign, "rehearse", rehearse)
+    assert main(["rehearse", "drawn", "--seeds", "100000", "--jobs", "2", "--format", "json"]) == 3
+    said = capsys.readouterr()
+    (report,) = json.loads(said.out)["reports"]
+    runs = report["run"]["runs"]
+    assert 20 < runs < 100_000, "those before the seed that interrupts, and those of the other process"
+    assert report["verdicts"][0]["bound"] == f"{runs:,} runs of 100,000; interrupted"
+    assert said.err == ""
+    assert not active_children()
+
+
+def test_ctrl_c_while_a_run_is_made_shorter_shows_it_as_it_was(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def shrunk(*_: object) -> Failed:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(
+        firable.executor.simulation.campaign, "rehearse", lambda _, run, __: Failed(run, "a kind", "words", ())
+    )
+    monkeypatch.setattr(firable.executor.simulation.campaign, "shrunk", shrunk)
+    assert main(["rehearse", "drawn", "--seeds", "2"]) == 1
+    assert "firable rehearse drawn --seed 0" in told(capsys)
 
 
 def test_a_run_that_fails_is_shown_with_its_last_steps_and_the_command_that_brings_it_back(
