@@ -127,9 +127,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return ExitCode.UNKNOWN
     except Exception as error:  # the edge of the program: every ending becomes an exit code and a message
         return _ended_by(error, arguments)
-    except KeyboardInterrupt:
-        click.echo("interrupted: nothing is known yet", err=True)
-        return ExitCode.UNKNOWN
     return int(code or 0)
 
 
