@@ -10,11 +10,13 @@ nor a solver.
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from typing import TextIO
 
 import click
 
@@ -41,6 +43,8 @@ EXTRAS = {
     "cvc5": ("verify", "the second solver; or ask the first one: --solver z3"),
 }
 
+FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
+"""The errors of a disk that takes no more."""
 
 COMMANDS = {
     "bundle": "bundle.bundle",
@@ -115,23 +119,39 @@ def firable(context: click.Context, traceback: bool) -> None:  # noqa: ARG001 - 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit code."""
     arguments = list(sys.argv[1:] if arguments is None else arguments)
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:  # closed by who started us, and wants nothing of it
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"))
+        elif isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal that knows no '✓' shows '?' instead of failing
+    try:
+        return _run(arguments)
+    except OSError:  # standard error cannot be written either: nothing is told, and the exit code is not success
+        _to_nowhere(sys.stderr)
+        return ExitCode.INPUT_ERROR
+
+
+def _run(arguments: Sequence[str]) -> int:
     try:
         code = firable.main(arguments, prog_name="firable", standalone_mode=False)
         sys.stdout.flush()
     except BrokenPipeError:
         # Whoever read our output has gone (`firable ... | head`). What is still buffered has no reader.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _to_nowhere(sys.stdout)
         return ExitCode.UNKNOWN
     except Exception as error:  # the edge of the program: every ending becomes an exit code and a message
         return _ended_by(error, arguments)
     return int(code or 0)
 
 
+def _to_nowhere(stream: TextIO) -> None:
+    """Let what a stream still holds, which its other side does not take, go nowhere when the process ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
 def _ended_by(error: Exception, arguments: Sequence[str]) -> int:
-    from firable.nets.diagnostics import InputError
+    from firable.nets.diagnostics import Diagnostic, InputError
 
     match error:
         case click.exceptions.NoArgsIsHelpError():
@@ -153,6 +173,12 @@ def _ended_by(error: Exception, arguments: Sequence[str]) -> int:
                 f"  hint: pip install 'firable[{extra}]' installs {what}",
                 err=True,
             )
+            return ExitCode.INPUT_ERROR
+        case OSError() if error.filename is None and error.errno in FULL:
+            # Whoever writes a file has said which: this is what is printed.
+            _to_nowhere(sys.stdout)
+            message = f"standard output cannot be written: {error.strerror}"
+            show_errors([Diagnostic("F1017", message, "make room where it goes, or send it elsewhere")])
             return ExitCode.INPUT_ERROR
         case MemoryError():
             click.echo("unknown: the memory of this machine is used up\n  hint: --max-memory sets a bound", err=True)

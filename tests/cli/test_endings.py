@@ -1,10 +1,43 @@
-"""How a command ends that Ctrl-C meets before it has begun."""
+"""How a command ends whose output goes nowhere, or that Ctrl-C meets before it has begun."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+FIRABLE = [sys.executable, "-m", "firable.cli"]
+SAYS_TOO_MUCH = [["check", "catalogue:one_robot"], ["check", "catalogue:one_robot", "--format", "json"], ["--help"]]
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("arguments", [*SAYS_TOO_MUCH, ["schema", "net"]])
+def test_a_disk_that_is_full_under_the_output_is_one_clear_error(arguments: list[str], unbuffered: str) -> None:
+    with Path("/dev/full").open("w") as full:
+        environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+        done = subprocess.run(
+            [*FIRABLE, *arguments], stdout=full, stderr=subprocess.PIPE, text=True, env=environment, check=False
+        )
+    assert done.returncode == 2
+    assert done.stderr == (
+        "error[F1017]: standard output cannot be written: No space left on device\n"
+        "  hint: make room where it goes, or send it elsewhere\n"
+    )
+
+
+@pytest.mark.parametrize("arguments", [["check", "nowhere.firable.yaml"], ["check"]])
+def test_an_error_that_can_be_told_nowhere_is_still_an_error_by_its_exit_code(arguments: list[str]) -> None:
+    with Path("/dev/full").open("w") as full:
+        assert subprocess.run([*FIRABLE, *arguments], stderr=full, check=False).returncode == 2
+        assert subprocess.run([*FIRABLE, *arguments], stdout=full, stderr=full, check=False).returncode == 2
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-"])
+def test_who_closes_an_output_gets_the_exit_code_alone(closed: str) -> None:
+    line = f"{sys.executable} -m firable.cli check catalogue:conceptual_one_robot {closed}"
+    done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 @pytest.mark.parametrize("module", ["click", "firable.cli.main", "firable.cli.check", "pydantic"])
