@@ -11,7 +11,8 @@ Rejected: a list in each command of what it reads. The next option is missing in
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+import stat
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -27,27 +28,39 @@ _NAMED: Final = "firable.files"  # where the context of a command keeps the file
 def net_files(arguments: Sequence[str]) -> tuple[str, ...]:
     """The arguments, with every folder replaced by the net files below it, in the order of their names.
 
-    A folder without a net file stays, for `load_net` to refuse.
+    What cannot be read stays, for `load_net` to refuse: a folder without a net file, one that may not be looked into.
     """
     found: list[str] = []
     for argument in arguments:
-        found += [str(path) for path in nets_below(argument)] or [argument]
+        found += [str(path) for path in sorted(nets_below(argument))] or [argument]
     return tuple(found)
 
 
-def nets_below(argument: str) -> list[Path]:
-    """The net files of a project, sorted; none where the argument is no folder.
+def nets_below(argument: str) -> Iterator[Path]:
+    """The net files of a project, and the folders that may not be looked into; none where the argument is no folder.
 
-    None is in hidden folders, nor in what is installed there, which has a catalogue.
+    There are none in hidden folders, nor in what is installed there, which has a catalogue.
     """
-    found: list[Path] = []
     if not is_folder(argument):
-        return found
-    for here, folders, files in os.walk(argument):
-        folders[:] = [one for one in folders if not one.startswith(".") and not Path(here, one, "pyvenv.cfg").exists()]
-        paths = (Path(here, one) for one in files if one.endswith(NET_FILES))
-        found += [path for path in paths if path.is_file()]
-    return sorted(found)
+        return
+    refused: list[OSError] = []
+    for here, folders, files in os.walk(argument, onerror=refused.append):
+        if "pyvenv.cfg" in files and here != argument:
+            folders.clear()
+            continue
+        folders[:] = [one for one in folders if not one.startswith(".")]
+        yield from (path for one in files if one.endswith(NET_FILES) and _is_there(path := Path(here, one)))
+    yield from (Path(error.filename) for error in refused)
+
+
+def _is_there(path: Path) -> bool:
+    """Whether a name in a folder stands for a file, and for no pipe and no broken link; or that cannot be told."""
+    try:
+        return stat.S_ISREG(path.stat().st_mode)
+    except FileNotFoundError:
+        return False
+    except OSError:
+        return True
 
 
 def is_folder(argument: str) -> bool:

@@ -145,7 +145,7 @@ def load_net(argument: str) -> Loaded:
     from firable.nets.loading import Loaded, load
 
     if not argument.startswith(CATALOGUE):
-        if is_folder(argument) and not nets_below(argument):
+        if is_folder(argument) and next(nets_below(argument), None) is None:
             raise InputError([Diagnostic("F1001", f"no net file is in {argument}", _NO_NETS)])
         return load(argument)
     name = argument.removeprefix(CATALOGUE)

@@ -7,6 +7,7 @@ All readers (text, PNML) go through here, so each of these mistakes has one code
 
 from __future__ import annotations
 
+import os
 import re
 import stat
 from collections.abc import Iterable
@@ -104,6 +105,8 @@ def read_bytes(path: str | Path, size_bytes_max: int) -> bytes:
     try:
         status = path.stat()
         if stat.S_ISDIR(status.st_mode):
+            with os.scandir(path) as entries:
+                next(entries, None)  # one that may not be looked into is told as such
             raise _refusal(path, "F1001", "this is a directory", "name a file in it")
         if not stat.S_ISREG(status.st_mode):
             raise _refusal(path, "F1001", "this is not a regular file", "name a file that can be read twice")

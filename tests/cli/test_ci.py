@@ -1,10 +1,13 @@
 """Nets in a project's CI: the workflows of `ci init`, folders of nets, the pre-commit hook, the pytest plugin."""
 
+import errno
 import json
+import os
 import shlex
 import subprocess
 import sys
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -106,6 +109,51 @@ def test_a_folder_without_nets_is_refused(project: Path, capsys: pytest.CaptureF
     assert "error[F1001]: no net file is in empty\n" in capsys.readouterr().err
     assert main(["draw", "cells"]) == 2
     assert "cells:1:1: error[F1001]: this is a directory\n  hint: name a file in it" in capsys.readouterr().err
+
+
+def test_a_folder_that_may_not_be_looked_into_is_told_and_the_others_are_checked(
+    project: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (project / "cells/locked").mkdir()
+    looked_into, known = os.scandir, Path.stat
+
+    def scandir(path: str | Path = ".") -> Iterator[os.DirEntry[str]]:
+        if Path(path).name == "locked":
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return looked_into(path)
+
+    def stat(path: Path, **options: bool) -> os.stat_result:
+        if path.parent.name == "locked":
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return known(path, **options)
+
+    monkeypatch.setattr(os, "scandir", scandir)
+    monkeypatch.setattr(Path, "stat", stat)
+    assert main(["check", ".", "--format", "json"]) == 2
+    document = json.loads(capsys.readouterr().out)
+    assert [one["input"] for one in document["reports"]] == ["cells/late/late.firable.yaml", "cells/safe.firable.yaml"]
+    assert [(one["file"], one["message"]) for one in document["errors"]] == [
+        ("cells/locked", "cannot be read: Permission denied")
+    ]
+    assert main(["draw", "cells/locked"]) == 2
+    assert "cells/locked:1:1: error[F1001]: cannot be read: Permission denied" in capsys.readouterr().err
+
+
+def test_a_net_file_of_a_folder_that_may_only_be_listed_is_told(
+    project: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known = Path.stat
+
+    def stat(path: Path, **options: bool) -> os.stat_result:
+        if path.name == "safe.firable.yaml":
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return known(path, **options)
+
+    monkeypatch.setattr(Path, "stat", stat)
+    assert main(["check", "cells"]) == 2
+    told = capsys.readouterr()
+    assert "cells/safe.firable.yaml:1:1: error[F1001]: cannot be read: Permission denied" in told.err
+    assert "cells/late/late.firable.yaml" in told.out
 
 
 def test_all_nets_of_a_project_are_checked_and_none_that_is_installed_there(
