@@ -15,8 +15,10 @@ import io
 import os
 import sys
 from collections.abc import Sequence
+from copy import copy
+from functools import wraps
 from importlib import import_module
-from typing import TextIO
+from typing import Any, TextIO
 
 import click
 
@@ -72,6 +74,9 @@ COMMANDS = {
 }
 """The commands, each with its function in `firable.cli`."""
 
+MAY_BE_EMPTY = frozenset({"marking"})
+"""The arguments that name no thing: the marking without a token is one."""
+
 
 class _Commands(click.Group):
     """Commands that are loaded when they are named: all of them take longer to load than a small net to check."""
@@ -86,7 +91,7 @@ class _Commands(click.Group):
             return None
         module, _, function = COMMANDS[cmd_name].rpartition(".")
         command: click.Command = getattr(import_module(f"firable.cli.{module}"), function)
-        return command
+        return _demanding_names(command)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -97,6 +102,30 @@ class _Commands(click.Group):
 
             ctx.fail(with_meant(f"No such command '{args[0]}'.", args[0], list(COMMANDS)))
         return super().resolve_command(ctx, args)
+
+
+def _demanding_names(command: click.Command) -> click.Command:
+    """The command, which refuses an empty argument: as a path that would be the folder in which the command runs."""
+    run = command.callback
+    if run is None:
+        return command
+
+    @wraps(run)
+    def checked(*given: Any, **named: Any) -> Any:
+        context = click.get_current_context()
+        for parameter in command.params:
+            value = context.params.get(parameter.name or "")
+            if _is_empty(value) and value != parameter.default and parameter.name not in MAY_BE_EMPTY:
+                raise click.BadParameter("it is empty", context, parameter)
+        return run(*given, **named)
+
+    demanding = copy(command)
+    demanding.callback = checked
+    return demanding
+
+
+def _is_empty(value: object) -> bool:
+    return value == "" or (isinstance(value, tuple) and any(map(_is_empty, value)))
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})

@@ -155,6 +155,41 @@ def test_a_wrong_command_line_says_what_is_wrong(
     assert words.lower() in refused(capsys, *arguments).lower()
 
 
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["check", ""], "NET..."),
+        (["check", "catalogue:conceptual_one_robot", ""], "NET..."),
+        (["check", "catalogue:one_robot_mc_late", "--trace-dir", ""], "--trace-dir"),
+        (["check", "catalogue:one_robot", "--evidence", ""], "--evidence"),
+        (["draw", "catalogue:one_robot", "-o", ""], "-o"),
+        (["prove", "catalogue:one_robot", "--smt-dir", ""], "--smt-dir"),
+        (["run", "cell.bundle", "--trace", ""], "--trace"),
+        (["run", "cell.bundle", "--journal", ""], "--journal"),
+        (["run", "cell.bundle", "--serve-tls", "cert.pem", ""], "--serve-tls"),
+        (["sign", "--make-key", ""], "--make-key"),
+        (["split", "catalogue:one_robot", "--subnets", ""], "--subnets"),
+        (["takeover", "old.bundle", "new.bundle", "--journal", "", "--into", "b"], "--journal"),
+    ],
+)
+def test_an_empty_name_is_refused_and_never_the_folder_that_the_command_runs_in(
+    arguments: list[str],
+    named: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    said = refused(capsys, *arguments)
+    assert f"Error: Invalid value for '{named}'" in said
+    assert said.endswith(": it is empty\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_marking_without_a_token_is_no_empty_name(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["draw", "catalogue:one_robot", "--marking", ""]) == 0
+
+
 def test_an_output_that_cannot_be_written_leaves_nothing_behind(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -164,7 +199,7 @@ def test_an_output_that_cannot_be_written_leaves_nothing_behind(
     for output in (str(tmp_path / "no" / "x.svg"), str(tmp_path / "file" / "x.svg"), str(tmp_path / "folder.svg")):
         for command in (["draw", "catalogue:one_robot"], ["bundle", "catalogue:one_robot"]):
             assert "error[F1017]" in refused(capsys, *command, "-o", output)
-    for output in (".", "", "/"):
+    for output in (".", "/"):
         assert "error[F1017]" in refused(capsys, "bundle", "catalogue:one_robot", "-o", output)
     said = refused(capsys, "convert", "catalogue:one_robot", "-o", str(tmp_path / "no" / "x.pnml"))
     assert "error[F1017]" in said
