@@ -239,8 +239,9 @@ def _told(answer: dict[str, Any]) -> str:
 def _token_kept(path: Path) -> str:
     """The token in a file, which is made with a new one if there is none."""
     from firable.executor.operating.control import new_token
+    from firable.nets.writing import stands
 
-    if path.exists():
+    if stands(path):
         return _token_read(path)
     token = new_token()
     try:

@@ -46,9 +46,10 @@ def kept_layout(net: Net, argument: str) -> Arrangement:
     from firable.cli.text import show_diagnostic
     from firable.nets.drawing.arrangement import Arrangement
     from firable.nets.drawing.layout_file import layout_path, read_layout, vanished
+    from firable.nets.writing import stands
 
     path = layout_path(argument)
-    if argument.startswith(CATALOGUE) or not path.is_file():
+    if argument.startswith(CATALOGUE) or not stands(path) or not path.is_file():
         return Arrangement()
     given = read_layout(path)
     for note in vanished(given, net, str(path)):

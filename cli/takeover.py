@@ -122,8 +122,10 @@ def takeover(
 @contextmanager
 def _removed_if_it_fails(journals: Collection[str]) -> Iterator[None]:
     """Leave none of these journals, where none stood, unless all are there: part of a cell must not be started."""
+    from firable.nets.writing import stands
+
     names = [f"{file}{end}" for file in journals for end in ("", ".generation", ".cell")]
-    new = [name for name in names if not Path(name).exists()]
+    new = [name for name in names if not stands(name)]
     try:
         yield
     except BaseException:
@@ -223,12 +225,13 @@ def _reachable(net: Net, marking: tuple[str, ...], allowed: Budget) -> Verdict:
 def _refuse_missing(journals: Sequence[str]) -> None:
     from firable.nets.diagnostics import Diagnostic, InputError
     from firable.nets.source import printable
+    from firable.nets.writing import stands
 
     for file in journals:
         if _is_twice(file, journals):
             message = f"{printable(file)}: the journal is named twice"
             raise InputError([Diagnostic("F5050", message, "name one journal for each host, that of its last run")])
-        if not Path(file).is_file():
+        if not stands(file) or not Path(file).is_file():
             message = f"{printable(file)}: there is no journal"
             raise InputError([Diagnostic("F1001", message, "name the file that `firable run OLD --journal` wrote")])
 
@@ -236,14 +239,15 @@ def _refuse_missing(journals: Sequence[str]) -> None:
 def _refuse_standing(into: Sequence[str]) -> None:
     from firable.nets.diagnostics import Diagnostic, InputError
     from firable.nets.source import printable
+    from firable.nets.writing import stands
 
     for file in into:
         message = f"{printable(file)}: a file stands there, and may be the journal of a cell"
         hint = "name another file"
-        if Path(f"{file}-wal").exists():  # SQLite would take it for the end of the new one
+        if stands(f"{file}-wal"):  # SQLite would take it for the end of the new one
             message = f"{printable(file)}-wal: what an earlier journal of that name has left stands there"
             hint = "name another file, or remove that one with its journal"
-        elif not Path(file).exists():
+        elif not stands(file):
             continue
         raise InputError([Diagnostic("F1017", message, hint)])
 

@@ -29,7 +29,7 @@ from firable.nets.bundle import Bundle
 from firable.nets.diagnostics import Diagnostic, InputError, Span
 from firable.nets.interchange import canonical_json
 from firable.nets.source import printable, read_bytes
-from firable.nets.writing import write_whole
+from firable.nets.writing import stands, write_whole
 
 SUFFIX: Final = ".signatures"
 _SIZE_BYTES_MAX: Final = 1 << 20
@@ -54,7 +54,7 @@ def signatures_path(bundle_path: str | Path) -> Path:
     'cell.bundle.signatures'
     """
     path = Path(bundle_path)
-    return path.with_name(path.name + SUFFIX)
+    return Path(f"{path}{SUFFIX}")
 
 
 def make_key(path: str | Path) -> str:
@@ -63,16 +63,16 @@ def make_key(path: str | Path) -> str:
     Raises `InputError` F1017 where a file cannot be written, or stands there already: a key is never overwritten.
     """
     path = Path(path)
-    public_path = path.with_name(path.name + ".pub")
+    public_path = Path(f"{path}.pub")
     key = Ed25519PrivateKey.generate()
     secret = key.private_bytes(
         serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
     )
     public = key.public_key().public_bytes(serialization.Encoding.PEM, serialization.PublicFormat.SubjectPublicKeyInfo)
-    for file in (path, public_path):
-        if file.exists():
-            raise _refusal("F1017", file, "a file stands there, and may be a key in use", "name another file")
     try:
+        for file in (path, public_path):
+            if file.exists():
+                raise _refusal("F1017", file, "a file stands there, and may be a key in use", "name another file")
         descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     except (OSError, ValueError) as error:
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
@@ -91,7 +91,7 @@ def sign(bundle: Bundle, bundle_path: str | Path, key_path: str | Path) -> str:
     key = _secret(key_path)
     at = signatures_path(bundle_path)
     record = SignaturesRecord(bundle=bundle.digest, signatures={})
-    if at.exists():
+    if stands(at):
         found = _record(at)
         if found.bundle == bundle.digest:  # those of the bundle that stood here before are worth nothing now
             record = found
@@ -109,7 +109,7 @@ def demand_signature(bundle: Bundle, bundle_path: str | Path, trusted_paths: Seq
     """
     trusted = {_name(key): key for key in map(_public, trusted_paths)}
     at = signatures_path(bundle_path)
-    if not at.exists():
+    if not stands(at):
         hint = f"its signatures are expected in {printable(at.name)}, beside it; `firable sign` writes them there"
         raise _refusal("F5023", bundle_path, "the bundle is not signed, and a signature is demanded", hint)
     record = _record(at)

@@ -52,6 +52,14 @@ def make_folder(path: str | Path) -> None:
             raise OSError(None, "this is a file, and a folder is wanted") from None
 
 
+def stands(path: str | Path) -> bool:
+    """Whether something stands at a path; under a name that no file can have, nothing does."""
+    try:
+        return Path(path).exists()
+    except OSError:
+        return False
+
+
 def _refuse_what_is_no_file(path: str, target: Path) -> None:
     if path.endswith("/") or target.is_dir():
         raise IsADirectoryError(None, "this is a directory")

@@ -214,7 +214,7 @@ class SqliteJournal:
 
 def witness_of(path: Path | str) -> Path:
     """The file beside a journal that tells of its last sync."""
-    return Path(path).with_name(Path(path).name + ".generation")
+    return Path(f"{Path(path)}.generation")
 
 
 def machines_of(path: Path | str) -> tuple[str, ...]:
