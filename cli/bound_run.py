@@ -103,8 +103,8 @@ def _verdict(report: RunReport, bind: str) -> Verdict:
     from firable.nets.verdict import Status, Verdict
 
     went_wrong = report.state not in {State.STOPPED, State.HELD}
-    # An emergency stop is no failure of the cell, and nothing that a service manager may take for an end in order.
-    unsettled = report.state is State.HELD or report.situation.is_emergency
+    # This is no failure of the cell, and nothing that a service manager may take for an end in order.
+    unsettled = report.situation.is_unsettled
     return Verdict(
         "ran-until-stopped",
         Status.VIOLATED if went_wrong else Status.UNKNOWN if unsettled else Status.PROVED,

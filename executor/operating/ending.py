@@ -68,7 +68,7 @@ def _situation(run: Host) -> Situation:
         others = "; ".join(filter(None, (ENDS_WITH_THE_CYCLE, at_home, others)))
     if run.taking_up is not None:
         held = restart.told(run, run.taking_up)
-        return Situation(State.HELD, run.marking, (), "; ".join(filter(None, (held, others))))
+        return Situation(State.HELD, run.marking, (), "; ".join(filter(None, (held, others))), is_held=True)
     if not run.is_quiet and not run.paused:
         return Situation(State.RUNNING, run.marking, (), others)
     if run.is_whole and run.recorder.is_deadlock:
@@ -86,15 +86,10 @@ def _unready(run: Host, one: Blocked) -> Blocked:
 
 def ended(run: Host) -> Situation | None:
     """How the run has ended; None where it goes on."""
-    if not run.is_whole:
-        if not run.stopping or not (run.has_waited or _nobody_waits(run)):
-            return None
-        found = _reached(run)
-        if run.taking_up is None or found.is_emergency:
-            return found
-        return replace(found, message="; ".join(filter(None, (found.message, restart.told(run, run.taking_up)))))
     if run.stopping:
-        return _reached(run)
+        return _stopped(run) if run.is_whole or run.has_waited or _nobody_waits(run) else None
+    if not run.is_whole:
+        return None
     if run.taking_up is not None:
         if not run.taking_up.is_final or run.operated:
             return None
@@ -110,6 +105,15 @@ def ended(run: Host) -> Situation | None:
     # With an operator present, a cell at rest is waited for: it may be paused, or be given work.
     is_stuck = run.at_rest and not run.operated and not (run.paused and run.served)
     return _reached(run) if is_stuck or run.recorder.is_deadlock else None
+
+
+def _stopped(run: Host) -> Situation:
+    """The end of a run that was stopped; of one that was held, with what became of its commands."""
+    found = _reached(run)
+    if run.taking_up is None or found.is_emergency:
+        return found
+    told = "; ".join(filter(None, (found.message, restart.told(run, run.taking_up))))
+    return replace(found, message=told, is_held=True)
 
 
 async def close(run: Host, tasks: Collection[asyncio.Task[None]]) -> list[str]:

@@ -139,6 +139,6 @@ def told(run: Host, found: TakingUp) -> str:
         if place not in found.answers:
             lines.append(f"'{run.net.place(place).command}' of '{place}' was decided and not sent; it will be")
     if found.is_final and (open_ := uncertain(run)):
-        how = "say" if run.served else "--say"
+        how = "say" if run.served and not run.stopping else "--say"
         lines.append(f"look at the machine and say what it did: {how} {open_[0]}=done, =working or =not-received")
     return "; ".join(lines)

@@ -81,6 +81,13 @@ class Situation:
     message: str = ""
     is_emergency: bool = False
     """Whether it is an emergency stop that has ended the run, and no stop that somebody wanted to come."""
+    is_held: bool = False
+    """Whether the run is held, or was when it was stopped: its machines are in the middle of something."""
+
+    @property
+    def is_unsettled(self) -> bool:
+        """Whether somebody has to look, though nothing has failed."""
+        return self.is_emergency or self.is_held
 
     def __str__(self) -> str:
         lines = [f"{self.state}: {self.message}" if self.message else str(self.state)]

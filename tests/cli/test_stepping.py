@@ -141,7 +141,8 @@ def test_enter_for_the_next_step_takes_up_no_run_that_was_stopped_and_reset_else
 ) -> None:
     situation, asked = run(monkeypatch, stopped, reset, said, "", "", "s")
     assert asked == [("[Enter]", 1), ("type", 1), ("what", 1), *[("[r]", 1)] * 3]
-    assert (situation.state, situation.message) == (State.STOPPED, "stopped by the operator")
+    assert (situation.state, situation.is_held) == (State.STOPPED, True)
+    assert situation.message.startswith("stopped by the operator; the run was interrupted")
 
 
 def test_a_run_that_is_taken_up_elsewhere_is_paused_at_the_terminal_and_stepped_on(
@@ -172,7 +173,8 @@ def test_what_was_typed_ahead_resets_nothing_and_a_run_that_runs_on_is_latched_a
 def test_what_was_typed_ahead_of_a_reset_elsewhere_takes_nothing_up(monkeypatch: pytest.MonkeyPatch) -> None:
     situation, asked = run(monkeypatch, stopped, reset_while_somebody_types, said, "s")
     assert asked == [("[Enter]", 1), ("type", 1), ("what", 1), ("[r]", 1)]
-    assert (situation.state, situation.message) == (State.STOPPED, "stopped by the operator")
+    assert (situation.state, situation.is_held) == (State.STOPPED, True)
+    assert situation.message.startswith("stopped by the operator; the run was interrupted")
 
 
 @pytest.mark.parametrize("last", [("s",), ()], ids=["s", "end of input"])

@@ -194,7 +194,9 @@ def test_a_resume_after_the_stop_of_a_run_that_is_held_commands_nothing() -> Non
         assert run.taking_up.is_final
         run.stop()
         assert not run.resume()
-        assert (await ending).state is State.STOPPED
+        ended = await ending
+        assert (ended.state, ended.is_unsettled) == (State.STOPPED, True)
+        assert "'R WORK' of 'robot.working' has not reached its machine" in ended.message
         assert machine.sent == []
 
     run_in_virtual_time(main())

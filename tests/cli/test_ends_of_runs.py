@@ -1,0 +1,65 @@
+"""How a run has ended is its exit code: whether all is well, or somebody has to look."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+from support.waiting import PATIENCE_SECONDS, heard_in_time, until
+
+from firable.cli.main import main
+
+NET = """\
+firable: 1
+cell: cell
+controllers:
+  robot: {start: free, places: {free: , working: {send: {machine: R, command: WORK}, until: worked}}}
+transitions:
+  begin: {from: robot.free, to: robot.working}
+  end: {from: robot.working, to: robot.free}
+"""
+BINDING = """\
+firable_bind: 1
+cell: cell
+devices:
+  R: {driver: simulated, seconds: 600, channels: {R: {command: R, taken: R.taken, done: R.done, failed: R.failed}}}
+signals: {robot.worked: acknowledged}
+commands: {robot.working: {device: R, channel: R, write: {}}}
+"""
+
+
+def firable(*arguments: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-u", "-m", "firable.cli", *arguments]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+
+def test_a_run_on_machines_that_is_stopped_while_it_is_held_ends_as_one_that_somebody_has_to_look_at(
+    tmp_path: Path,
+) -> None:
+    net, bind, bundle, trace = (tmp_path / name for name in ("cell.firable.yaml", "bind", "cell.bundle", "trace"))
+    net.write_text(NET)
+    bind.write_text(BINDING)
+    assert main(["bundle", str(net), "-o", str(bundle)]) == 0
+    run = ["run", str(bundle), "--bind", str(bind), "--journal", str(tmp_path / "journal"), "--trace", str(trace)]
+    running = firable(*run)
+    held = None
+    try:
+        until(lambda: trace.exists() and '"command"' in trace.read_text(), "a command")
+        running.kill()
+        running.wait()
+        held = firable(*run, "--serve", "127.0.0.1:0")
+        assert held.stdout is not None
+        with heard_in_time(held):
+            next(line for line in held.stdout if "is held after a restart" in line)
+        held.send_signal(signal.SIGTERM)
+        said, _ = held.communicate(timeout=PATIENCE_SECONDS)
+        assert held.returncode == 3, said
+        assert "'R WORK' of 'robot.working' was issued, and nobody knows what became of it" in said
+        assert "--say robot.working=done" in said, "there is nobody left who is served"
+    finally:
+        for process in (running, held):
+            if process is not None:
+                process.kill()
+                process.communicate()
