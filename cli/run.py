@@ -273,9 +273,13 @@ def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, .
 
     method = f"run on the simulated cell, seed {seed}"
     through = len(report.delivered)
+    unsettled, all_through = report.situation.is_unsettled, through == workpieces
     ended = {State.DONE: Status.PROVED, State.STOPPED: Status.UNKNOWN, State.HELD: Status.UNKNOWN}.get(
         report.state, Status.VIOLATED
     )
+    if report.state is State.STOPPED and all_through and not unsettled:
+        ended = Status.PROVED
+    reached = report.situation.message if all_through else f"{through} went through"
     intact = not report.lost and not report.doubled
     verdicts = [
         Verdict(
@@ -283,7 +287,7 @@ def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, .
             ended,
             f"{workpieces} workpieces go through the cell",
             method,
-            bound=f"{through} went through" if ended is Status.UNKNOWN else "",
+            bound=reached if ended is Status.UNKNOWN else "",
             subjects=(*_why(report), *map(str, report.situation.blocked)) if ended is Status.VIOLATED else (),
         ),
         Verdict(

@@ -7,9 +7,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from support.waiting import PATIENCE_SECONDS, heard_in_time, until
 
 from firable.cli.main import main
+from firable.cli.run import _verdicts
+from firable.executor import RunReport
+from firable.executor.operating.situation import Situation, State
+from firable.nets.verdict import Status
 
 NET = """\
 firable: 1
@@ -63,3 +68,22 @@ def test_a_run_on_machines_that_is_stopped_while_it_is_held_ends_as_one_that_som
             if process is not None:
                 process.kill()
                 process.communicate()
+
+
+@pytest.mark.parametrize(
+    ("through", "situation", "status"),
+    [
+        (2, Situation(State.STOPPED, (), message="stopped at the end of the cycle"), Status.PROVED),
+        (1, Situation(State.STOPPED, (), message="stopped at the end of the cycle"), Status.UNKNOWN),
+        (2, Situation(State.STOPPED, (), message="emergency stop: a person", is_emergency=True), Status.UNKNOWN),
+        (2, Situation(State.STOPPED, (), message="stopped; it was held", is_held=True), Status.UNKNOWN),
+    ],
+)
+def test_a_run_that_was_stopped_when_all_workpieces_were_through_has_carried_them_through(
+    through: int, situation: Situation, status: Status
+) -> None:
+    report = RunReport(situation, tuple(range(1, through + 1)), (), (), (), {}, 0, 0, {}, 1.0)
+    carried = _verdicts(report, 2, 0)[0]
+    assert carried.status is status
+    told = {Status.PROVED: "", Status.UNKNOWN: situation.message if through == 2 else "1 went through"}
+    assert carried.bound == told[status]
