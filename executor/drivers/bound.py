@@ -93,6 +93,11 @@ class BoundDriver:
         return tuple(name for name, device in self.devices.items() if not device.kept.is_safe)
 
     @property
+    def undriven(self) -> tuple[str, ...]:
+        """The devices that have safe outputs and have not confirmed those with which their connections begin."""
+        return tuple(name for name, one in self.devices.items() if one.document.safe and not one.kept.started)
+
+    @property
     def unreached(self) -> tuple[str, ...]:
         """In a phrase each, the devices that are not connected, have never shown a signal, or not taken a command."""
         of_each = ((one.unreached,) if one.unreached else (one.unshown, one.untaken) for one in self.devices.values())

@@ -171,6 +171,11 @@ class Latched(Driver, Protocol):
     contact nor a lost device for news. It reads, and answers what it is asked.
     """
 
+    @property
+    def undriven(self) -> Collection[str]:
+        """The devices that have not confirmed the safe outputs on any connection of this driver."""
+        ...
+
     def against(self) -> Collection[str]:
         """What keeps it from being released, in a phrase each: contacts that are open, devices that do not answer."""
         ...

@@ -81,6 +81,11 @@ class DryRunDriver:
         """Complete nothing any more."""
         self.is_stopped = True
 
+    @property
+    def undriven(self) -> tuple[str, ...]:
+        """None: there is no device that could be out of reach."""
+        return ()
+
     def against(self) -> tuple[str, ...]:
         """Nothing: there is no device that could be out of reach."""
         return ()

@@ -151,6 +151,11 @@ class SimulatedDriver:
         self.is_known = False
         return self
 
+    @property
+    def undriven(self) -> tuple[str, ...]:
+        """None: there is no device that could be out of reach."""
+        return ()
+
     def against(self) -> tuple[str, ...]:
         """Nothing: there is no device that could be out of reach."""
         return ()

@@ -28,5 +28,5 @@ _PHRASES = {
     Standing.GOING: "goes on",
     Standing.PAUSED: "is paused",
     Standing.HELD: "is held until it is resumed",
-    Standing.LATCHED: "is held safe after an emergency stop, until it is reset and resumed",
+    Standing.LATCHED: "is latched by an emergency stop, until it is reset and resumed",
 }

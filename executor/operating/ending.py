@@ -146,13 +146,7 @@ def with_hanging(ended: Situation, hanging: Collection[str]) -> Situation:
 
 def with_unconfirmed(ended: Situation, devices: Collection[str]) -> Situation:
     """The end of a run after which these devices have not confirmed safe outputs: a fault, whatever it was before."""
-    if not devices:
-        return ended
-    have = "have" if len(devices) > 1 else "has"
-    return with_fault(
-        ended,
-        f"{' and '.join(devices)} {have} not confirmed the safe outputs: look at the machines, they may not be safe",
-    )
+    return with_fault(ended, latch.unconfirmed(devices)) if devices else ended
 
 
 def with_failed(ended: Situation, driver: asyncio.Task[None]) -> Situation:

@@ -25,6 +25,7 @@ does not do what it should, and a new process is the better answer.
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
@@ -48,6 +49,8 @@ class Latch:
 
     reason: str
     driver: Latched
+    unconfirmed: Collection[str] = ()
+    """The devices that had not confirmed the safe outputs when the life before ended."""
     was_reset: asyncio.Event = field(default_factory=asyncio.Event)
 
 
@@ -104,7 +107,15 @@ def told(run: Host) -> str:
     todo = (
         f"before it can be reset: {against}" if against else "it can be reset; then nothing moves until it is resumed"
     )
-    return f"emergency stop: {run.latch.reason}; the machines are held safe; {todo}"
+    open_ = [name for name in run.latch.unconfirmed if name in run.latch.driver.undriven]
+    return f"emergency stop: {run.latch.reason}; {unconfirmed(open_) or 'the machines are held safe'}; {todo}"
+
+
+def unconfirmed(devices: Collection[str]) -> str:
+    """That these devices have not confirmed the safe outputs, in words; nothing where there are none."""
+    have = "have" if len(devices) > 1 else "has"
+    told = f"{' and '.join(devices)} {have} not confirmed the safe outputs: look at the machines, they may not be safe"
+    return told if devices else ""
 
 
 def situation(run: Host) -> Situation:

@@ -91,7 +91,8 @@ async def _outcome(run: Host, outcome: asyncio.Future[Situation]) -> Situation:
 def _stay(run: Host, driver: Latched) -> None:
     """Begin the next life, latched by the emergency stop that has ended this one; what it has noted the next writes."""
     run.begin_seconds = run.now_seconds()
-    run.driver, run.latch, run.said = driver, Latch(run.emergency or "", driver), {}
+    unconfirmed = tuple(run.driver.unconfirmed)
+    run.driver, run.latch, run.said = driver, Latch(run.emergency or "", driver, unconfirmed), {}
     run.unwatch()
     met, is_due = run.peers.met, run.peers.is_due
     run.begin(resume=False)

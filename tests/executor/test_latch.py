@@ -113,6 +113,29 @@ def test_device_that_is_switched_off_while_latched_is_no_fault() -> None:
     asyncio.run(main())
 
 
+def test_device_that_has_not_confirmed_the_safe_outputs_is_named_until_it_has() -> None:
+    async def main() -> None:
+        async with served(1) as one:
+            said: list[str] = []
+
+            async def operator(host: Host) -> None:
+                await until(lambda: one.cell.at, "a machine at work")
+                modbus = one.cell.devices["modbus"].end
+                await modbus.cut()
+                host.emergency_stop("a person")
+                unsafe = "a person; modbus has not confirmed the safe outputs: look at the machines"
+                await until(lambda: any(unsafe in sentence for sentence in said), "that somebody has to look")
+                assert not any("held safe" in sentence for sentence in said)
+                await modbus.mend()
+                await until(lambda: "a person; the machines are held safe" in host.situation().message, "that it has")
+                host.stop()
+
+            situation, _ = await executed(one, operator, said)
+            assert (situation.state, situation.is_emergency) == (State.STOPPED, True)
+
+    asyncio.run(main())
+
+
 def test_emergency_stop_ends_a_run_that_nobody_could_reset() -> None:
     async def main() -> None:
         async with served(1) as one:

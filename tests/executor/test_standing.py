@@ -91,7 +91,7 @@ def test_a_host_that_is_held_or_latched_is_told_of_on_the_others() -> None:
         await asyncio.sleep(0.5)
         a.emergency_stop("pressed")
         await asyncio.sleep(5)
-        assert "'a' is held safe after an emergency stop, until it is reset and resumed" in cell.said
+        assert "'a' is latched by an emergency stop, until it is reset and resumed" in cell.said
         assert not a.reset()
         await asyncio.sleep(5)
         assert "'a' is held until it is resumed" in cell.said
@@ -104,7 +104,7 @@ def test_a_host_that_is_held_or_latched_is_told_of_on_the_others() -> None:
         assert again.resume()
         await asyncio.sleep(5)
         assert cell.said == ""
-        assert [sentence.split()[2] for sentence in cell.told] == ["held", "held", "held", "on"]
+        assert [sentence.split()[2] for sentence in cell.told] == ["latched", "held", "held", "on"]
         await cell.end()
 
     run_in_virtual_time(main())
