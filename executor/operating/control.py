@@ -32,6 +32,7 @@ import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Iterable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, Protocol
 
 from aiohttp import web
@@ -59,8 +60,8 @@ class Operated(Protocol):
         """What the run is doing."""
         ...
 
-    def pause(self) -> None:
-        """Let nothing fire any more."""
+    def pause(self) -> bool:
+        """Let nothing fire any more; whether it can be paused."""
         ...
 
     def resume(self) -> bool:
@@ -71,8 +72,8 @@ class Operated(Protocol):
         """While paused, fire one transition; its name, or None."""
         ...
 
-    def stop(self, *, at_end_of_cycle: bool = False) -> None:
-        """End the run."""
+    def stop(self, *, at_end_of_cycle: bool = False) -> bool:
+        """End the run; whether it can be ended so."""
         ...
 
     def emergency_stop(self, reason: str) -> None:
@@ -209,24 +210,22 @@ def application(
     async def metrics(_: web.Request) -> web.Response:
         return web.Response(body=figures(), headers={"Content-Type": METRICS_CONTENT_TYPE})
 
-    def commanding(command: str, act: Callable[[], object]) -> Callable[[web.Request], Awaitable[web.Response]]:
+    def commanding(
+        command: str, act: Callable[[], bool], unable: str
+    ) -> Callable[[web.Request], Awaitable[web.Response]]:
         async def handler(request: web.Request) -> web.Response:
             run.commanded(command, who(request))
-            act()
-            return web.json_response(_situation(run))
+            refused = [] if act() else [f"the run is {run.situation().state}, and cannot be {unable} now"]
+            return answered(request, command, refused)
 
         return handler
 
     def answered(request: web.Request, command: str, refused: Collection[str], **more: object) -> web.Response:
         """The answer to a command that may have been refused, which stands in the trace, too."""
+        now = _situation(run)  # as it was refused in; to note that is something that the run does
         if refused:
             run.not_obeyed(command, who(request), "; ".join(refused))
-        return web.json_response({**more, "refused": list(refused), **_situation(run)})
-
-    async def resume(request: web.Request) -> web.Response:
-        run.commanded("resume", who(request))
-        refused = [] if run.resume() else [f"the run is {run.situation().state}, and cannot be resumed now"]
-        return answered(request, "resume", refused)
+        return web.json_response({**more, "refused": list(refused), **now})
 
     async def step(request: web.Request) -> web.Response:
         run.commanded("step", who(request))
@@ -257,11 +256,12 @@ def application(
     app = web.Application(middlewares=[who_may], client_max_size=1024)
     app.router.add_get("/situation", situation)
     app.router.add_get("/metrics", metrics)
-    app.router.add_post("/pause", commanding("pause", run.pause))
-    app.router.add_post("/resume", resume)
+    app.router.add_post("/pause", commanding("pause", run.pause, "paused"))
+    app.router.add_post("/resume", commanding("resume", run.resume, "resumed"))
     app.router.add_post("/step", step)
-    app.router.add_post("/stop", commanding("stop", run.stop))
-    app.router.add_post("/stop-at-end", commanding("stop-at-end", lambda: run.stop(at_end_of_cycle=True)))
+    app.router.add_post("/stop", commanding("stop", run.stop, "stopped"))
+    at_end = partial(run.stop, at_end_of_cycle=True)
+    app.router.add_post("/stop-at-end", commanding("stop-at-end", at_end, "stopped at the end of the cycle"))
     app.router.add_post("/emergency-stop", emergency_stop)
     app.router.add_post("/reset", reset)
     app.router.add_post("/say", say)

@@ -223,12 +223,18 @@ class Host:
 
     # What the operator may do
 
-    def pause(self) -> None:
-        """Let nothing fire any more; machines end the command they are at."""
+    def pause(self) -> bool:
+        """Let nothing fire any more; machines end the command they are at.
+
+        False where the host is latched or stopping, and everything stands for longer than a pause.
+        """
+        if self.stopping or self.latch is not None:
+            return False
         if not self.paused:
             if self.acts.is_leaving:
                 self.acts.stay()
             stopping.halt(self, "paused")
+        return True
 
     def resume(self) -> bool:
         """Let transitions fire again after a pause, or after a restart once nothing about it is uncertain.
@@ -256,9 +262,12 @@ class Host:
         """While paused, fire one transition; returns its name, or None where none is enabled."""
         return await step(self)
 
-    def stop(self, *, at_end_of_cycle: bool = False) -> None:
-        """End the run: now, with every machine stopped where it is, or when the work in the cell is done."""
-        stopping.stop(self, at_end_of_cycle=at_end_of_cycle)
+    def stop(self, *, at_end_of_cycle: bool = False) -> bool:
+        """End the run: now, with every machine stopped where it is, or when the work in the cell is done.
+
+        False where it is to end with the cycle, and the host is latched or stopping.
+        """
+        return stopping.stop(self, at_end_of_cycle=at_end_of_cycle)
 
     def emergency_stop(self, reason: str) -> None:
         """Drive the safe outputs at once, before anything is written or said; it can be reset, or the run ends."""

@@ -24,21 +24,27 @@ SETTLE_SECONDS: Final = 2.0
 """So long a stop waits for what is open at the most."""
 
 
-def stop(run: Host, *, at_end_of_cycle: bool = False) -> None:
-    """End the run: now, with every machine stopped where it is, or when the work in the cell is done."""
+def stop(run: Host, *, at_end_of_cycle: bool = False) -> bool:
+    """End the run: now, with every machine stopped where it is, or when the work in the cell is done.
+
+    Not with the cycle where it is latched or stopping, and no cycle goes on: nothing of that is kept for afterwards.
+    """
     if at_end_of_cycle:
+        if run.stopping or run.latch is not None:
+            return False
         run.draining = True
         run.note("stopping at the end of the cycle")
         if not run.driver.close():
             run.acts.forgo(ending.beginnings(run.net))
             run.ends_at_home = True
-        return
+        return True
     run.is_to_end = True
     if not run.stopping:
         if run.is_whole and run.groups.storing is not None:
             run.make_safe()  # at the end of the run otherwise, which follows at once
         run.ended_by = run.ended_by or ("stopped by the operator" if run.is_whole else "")
         _end_soon(run, "stopped by the operator")
+    return True
 
 
 def emergency_stop(run: Host, reason: str) -> None:

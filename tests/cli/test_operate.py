@@ -90,7 +90,7 @@ def test_an_operator_pauses_steps_resumes_and_stops_a_run_at_once(
     operate(address, "resume", folder, capsys)
     operate(address, "emergency-stop", folder, capsys)
     until_told(address, "latched: emergency stop: by token", folder, capsys)
-    for command in ("resume", "step"):
+    for command in ("resume", "step", "pause", "stop-at-end"):
         told = operate(address, command, folder, capsys, code=1)
         assert told.startswith("refused: the run is latched, and ")
     operate(address, "stop", folder, capsys)

@@ -38,10 +38,12 @@ class Told:
         self.obeys = obeys
 
     def situation(self) -> Situation:
-        return Situation(State.WAITING, ("robot.free",))
+        is_at_work = bool(self.log) and "refused" in self.log[-1]  # by writing that down
+        return Situation(State.RUNNING if is_at_work else State.WAITING, ("robot.free",))
 
-    def pause(self) -> None:
+    def pause(self) -> bool:
         self.log.append("pause")
+        return self.obeys
 
     def resume(self) -> bool:
         self.log.append("resume")
@@ -51,8 +53,9 @@ class Told:
         self.log.append("step")
         return "G1" if self.obeys else None
 
-    def stop(self, *, at_end_of_cycle: bool = False) -> None:
+    def stop(self, *, at_end_of_cycle: bool = False) -> bool:
         self.log.append("stop at end" if at_end_of_cycle else "stop")
+        return self.obeys or not at_end_of_cycle
 
     def emergency_stop(self, reason: str) -> None:
         self.log.append(f"emergency stop {reason}")
@@ -115,24 +118,30 @@ def test_every_command_reaches_the_run_with_the_name_of_who_gave_it() -> None:
     ]
 
 
-def test_a_resume_or_a_step_that_does_nothing_is_refused_in_the_words_of_the_situation() -> None:
+@pytest.mark.parametrize(
+    ("command", "written", "why"),
+    [
+        ("pause", "pause", "cannot be paused now"),
+        ("resume", "resume", "cannot be resumed now"),
+        ("step", "step", "only one that is paused is stepped"),
+        ("stop-at-end", "stop at end", "cannot be stopped at the end of the cycle now"),
+    ],
+)
+def test_a_command_that_does_nothing_is_refused_in_the_words_of_the_situation(
+    command: str, written: str, why: str
+) -> None:
     async def main() -> None:
         run = Told(obeys=False)
-        async with serving(run, Endpoint("127.0.0.1", 0, TOKEN), lambda: b"") as url, ClientSession() as session:
-            async with session.post(f"{url}/resume", headers=BEARER) as answer:
-                assert (await answer.json())["refused"] == ["the run is waiting, and cannot be resumed now"]
-            async with session.post(f"{url}/step", headers=BEARER) as answer:
-                told = await answer.json()
-                assert told["fired"] is None
-                assert told["refused"] == ["the run is waiting, and only one that is paused is stepped"]
-        assert run.log == [
-            "token: resume",
-            "resume",
-            "token: resume refused: the run is waiting, and cannot be resumed now",
-            "token: step",
-            "step",
-            "token: step refused: the run is waiting, and only one that is paused is stepped",
-        ]
+        async with (
+            serving(run, Endpoint("127.0.0.1", 0, TOKEN), lambda: b"") as url,
+            ClientSession() as session,
+            session.post(f"{url}/{command}", headers=BEARER) as answer,
+        ):
+            told = await answer.json()
+            assert told["refused"] == [f"the run is waiting, and {why}"]
+            assert told["state"] == "waiting"
+            assert told.get("fired") is None
+        assert run.log == [f"token: {command}", written, f"token: {command} refused: the run is waiting, and {why}"]
 
     asyncio.run(main())
 

@@ -194,6 +194,8 @@ def test_a_resume_after_the_stop_of_a_run_that_is_held_commands_nothing() -> Non
         assert run.taking_up.is_final
         run.stop()
         assert not run.resume()
+        assert not run.pause()
+        assert not run.stop(at_end_of_cycle=True)
         ended = await ending
         assert (ended.state, ended.is_unsettled) == (State.STOPPED, True)
         assert "'R WORK' of 'robot.working' has not reached its machine" in ended.message

@@ -168,6 +168,9 @@ def test_latched_run_is_not_resumed_before_it_is_reset_and_may_be_latched_again(
             host.emergency_stop("a person")
             await until(lambda: host.situation().state is State.LATCHED, "the latch")
             assert not host.resume()
+            assert not host.pause()
+            assert not host.stop(at_end_of_cycle=True)
+            assert not host.draining
             assert all(controller.held for controller in host.controllers.values())
             assert host.reset() == ()
             assert host.reset() == ("there is no emergency stop to be reset",)
