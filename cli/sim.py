@@ -170,6 +170,7 @@ async def _serve(
     import asyncio
 
     from firable.executor.drivers.far_side.cell import CellServer
+    from firable.executor.drivers.far_side.end import GoneError
     from firable.nets.diagnostics import Diagnostic, InputError
 
     def tell(at_seconds: float, what: str) -> None:
@@ -195,6 +196,9 @@ async def _serve(
         except asyncio.CancelledError:
             if not cell.fault:
                 raise
+        except GoneError as error:
+            message, hint = f"the cell cannot be served any more: {error}", "the same command serves it anew"
+            raise InputError([Diagnostic("F5104", message, hint)]) from None
         finally:
             for line in _missed(plant, None if press is None or press <= cell.now_seconds() else press):
                 click.echo(line)

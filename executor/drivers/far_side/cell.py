@@ -17,8 +17,9 @@ from typing import Final
 
 from firable.executor.cell.plant import CommandDone, Plant, PlantFault, PlantReport, SensorChanged
 from firable.executor.drivers.binding import Binding, ChannelDocument, DeviceDocument, writes
+from firable.executor.drivers.cancelling import ended
 from firable.executor.drivers.device import Point, Value, as_bit, as_number
-from firable.executor.drivers.far_side.end import FarEnd
+from firable.executor.drivers.far_side.end import Dependent, FarEnd, GoneError
 from firable.nets.net import Command, Net
 
 BEATS_MISSED: Final = 5
@@ -95,8 +96,7 @@ class CellServer:
             try:
                 await end.start(partial(self._written_to, devices))
             except (OSError, RuntimeError) as error:
-                names = ", ".join(name for name, device in self.devices.items() if device in devices)
-                raise RuntimeError(f"{names}: {error}") from error
+                raise RuntimeError(f"{self._names(devices)}: {error}") from error
         for device in self.devices.values():
             for channel in device.channels.values():
                 self._clear(device, channel)
@@ -121,7 +121,20 @@ class CellServer:
             await end.stop()
 
     async def run(self) -> None:
-        """Let the plant's events happen when they are due, until cancelled; none does once something has collided."""
+        """Let the plant's events happen when they are due, until cancelled; none does once something has collided.
+
+        Raises `GoneError`, with the names of its devices, where an end is without what it needs.
+        """
+        lasting = [self._gone(end, devices) for end, devices in self._ends() if isinstance(end, Dependent)]
+        works = [asyncio.create_task(work) for work in (self._happening(), *lasting)]
+        try:
+            done, _ = await asyncio.wait(works, return_when=asyncio.FIRST_COMPLETED)
+            for work in done:
+                work.result()
+        finally:
+            await ended(works)
+
+    async def _happening(self) -> None:
         while True:
             if not self.fault:
                 self._report(self.plant.advance(self.now_seconds()))
@@ -132,6 +145,15 @@ class CellServer:
                 await asyncio.wait_for(self.awake.wait(), delay)
             except TimeoutError:
                 continue
+
+    async def _gone(self, end: Dependent, devices: list[_Device]) -> None:
+        try:
+            await end.gone()
+        except GoneError as error:
+            raise GoneError(f"{self._names(devices)}: {error}") from None
+
+    def _names(self, devices: list[_Device]) -> str:
+        return ", ".join(name for name, device in self.devices.items() if device in devices)
 
     def _ends(self) -> Iterator[tuple[FarEnd, list[_Device]]]:
         """Each end, with the devices that are reached by it."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from firable.executor.drivers.device import Point, Value
 
@@ -54,4 +54,17 @@ class FarEnd(Protocol):
 
     async def mend(self) -> None:
         """Let the line be as before."""
+        ...
+
+
+class GoneError(Exception):
+    """What an end cannot be without has ended, in a phrase."""
+
+
+@runtime_checkable
+class Dependent(Protocol):
+    """An end that cannot be without another process."""
+
+    async def gone(self) -> None:
+        """Wait until that has ended; raises `GoneError` then."""
         ...

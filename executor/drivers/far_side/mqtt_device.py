@@ -17,7 +17,7 @@ from pathlib import Path
 from aiomqtt import Client, MqttError
 
 from firable.executor.drivers.device import Point, Value, quiet
-from firable.executor.drivers.far_side.end import Faults
+from firable.executor.drivers.far_side.end import Faults, GoneError
 from firable.executor.drivers.far_side.ports import free_port
 from firable.executor.drivers.far_side.relay import Relay
 
@@ -68,8 +68,9 @@ class MqttEnd:
             lines += [f"listener {self.front} 127.0.0.1", self.secured]
         configuration.write_text("\n".join([*lines, ""]))
         quiet = asyncio.subprocess.DEVNULL
+        # In a session of its own: Ctrl-C at the terminal is for whoever ends it, and no end of its own.
         self.broker = await asyncio.create_subprocess_exec(
-            program, "-c", str(configuration), stdout=quiet, stderr=quiet
+            program, "-c", str(configuration), stdout=quiet, stderr=quiet, start_new_session=True
         )
         self.serving = asyncio.create_task(self._serve())
         ways = [asyncio.create_task(self.is_ready.wait()), asyncio.create_task(self.broker.wait())]
@@ -87,10 +88,17 @@ class MqttEnd:
             self.serving.cancel()
             await asyncio.gather(self.serving, return_exceptions=True)
         if self.broker is not None:
-            self.broker.terminate()
+            if self.broker.returncode is None:
+                self.broker.terminate()
             await self.broker.wait()
         if self.folder is not None:
             self.folder.cleanup()
+
+    async def gone(self) -> None:
+        """Wait until the broker has ended; raises `GoneError` then."""
+        if self.broker is not None:
+            await self.broker.wait()
+            raise GoneError("its broker, mosquitto, has ended")
 
     def show(self, point: Point, value: Value) -> None:
         """Publish a value, retained."""

@@ -1,17 +1,23 @@
 """MQTT through mosquitto, which is started for each test."""
 
 import asyncio
-from collections.abc import AsyncIterator
+import os
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from pathlib import Path
 
 import pytest
 
+from firable.cli.main import main
 from firable.executor.drivers.bench import Far, until
 from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.bound import BoundDriver
 from firable.executor.drivers.conformance import DriverConformance
+from firable.executor.drivers.device import Point, Value
+from firable.executor.drivers.far_side.ends import PORTS
 from firable.executor.drivers.far_side.machine import ROLES
 from firable.executor.drivers.far_side.mqtt_device import MqttEnd, mosquitto
+from firable.executor.drivers.far_side.ports import free_port
 
 ALIVE = "alive: {read: cell/M/button,within_s: 600}"
 """What a broker's device needs for an emergency stop; here it does not change."""
@@ -58,6 +64,26 @@ class Unheard:
 
     def emergency_stop(self, reason: str) -> None:
         pass
+
+
+@needs_mosquitto
+def test_a_cell_whose_broker_has_died_ends_and_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    start = MqttEnd.start
+
+    async def killed_soon(end: MqttEnd, written: Callable[[Point, Value], None]) -> None:
+        await start(end, written)
+        assert end.broker is not None
+        assert os.getpgid(end.broker.pid) != os.getpgrp(), "Ctrl-C at the terminal reaches it"
+        asyncio.get_running_loop().call_later(0.2, end.broker.kill)
+
+    monkeypatch.setattr(MqttEnd, "start", killed_soon)
+    monkeypatch.setitem(PORTS, "mqtt", str(free_port()))
+    command = ["sim", "catalogue:one_robot", "--mqtt", "--bind", str(tmp_path / "bind"), "--for", "60"]
+    assert main(command) == 2
+    said = capsys.readouterr().err
+    assert "error[F5104]: the cell cannot be served any more: mqtt: its broker, mosquitto, has ended" in said
 
 
 @needs_mosquitto
