@@ -58,26 +58,21 @@ def _writer(path: str) -> Callable[[str], None]:
     """What writes lines; no handler that `logging` would wait for at the end of the process, nor a stream's buffer."""
     from firable.nets.diagnostics import Diagnostic, InputError
     from firable.nets.source import printable
+    from firable.nets.writing import UNREAD
 
     if path == "-":
         return _on_standard_error
+    log = _InFile(path)
     try:
-        _demand_writable(path)
+        log.demand_writable()
     except (OSError, ValueError) as error:  # ValueError: a path with a NUL in it
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
         message = f"{printable(path)}: the log cannot be written: {reason}"
-        raise InputError([Diagnostic("F1017", message, "name a file in a folder that you may write to")]) from None
-    return _InFile(path).write
-
-
-def _demand_writable(path: str) -> None:
-    """Raise `OSError` where a log cannot be written; a run that is refused before it begins leaves no file behind."""
-    if (file := Path(path)).exists():
-        with file.open("ab"):
-            return
-    file.parent.stat()
-    if not os.access(file.parent, os.W_OK | os.X_OK):
-        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        hint = "name a file in a folder that you may write to"
+        if reason == UNREAD:
+            hint = "start who reads it before the run, or name a file"
+        raise InputError([Diagnostic("F1017", message, hint)]) from None
+    return log.write
 
 
 class _Aside(logging.Handler):
@@ -122,6 +117,18 @@ class _InFile:
         self.descriptor: int | None = None
         self.is_broken = False
 
+    def demand_writable(self) -> None:
+        """Raise `OSError` where it cannot be written; a run that is refused before it begins leaves no file behind.
+
+        One that is there stays open: who reads a pipe would take it for the end if it were closed again.
+        """
+        if (file := Path(self.path)).exists():
+            self._opened()
+            return
+        file.parent.stat()
+        if not os.access(file.parent, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
     def write(self, line: str) -> None:
         """Write a line with its end."""
         try:
@@ -133,6 +140,8 @@ class _InFile:
                     click.echo(f"  the log {self.path} cannot be written any more: {error}", err=True)
 
     def _opened(self) -> int:
+        from firable.nets.writing import open_at_once
+
         if self.descriptor is not None:
             try:
                 if os.path.samestat(Path(self.path).stat(), os.fstat(self.descriptor)):
@@ -141,5 +150,5 @@ class _InFile:
                 pass  # it was moved, and is begun anew
             os.close(self.descriptor)
             self.descriptor = None
-        self.descriptor = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        self.descriptor = open_at_once(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
         return self.descriptor

@@ -3,17 +3,19 @@
 The bytes go into a file beside the place, to the disk, and are renamed into the place: whoever opens the file finds
 the old content or the new, also after a power failure, and never half of either. Writing into the place itself would
 lose the old content first. A link is followed, so that it stays one; a device or a pipe is refused, because a rename
-would put a file where it was. A trace, which grows while a cell runs, is
-written by `firable.executor.operating.recorder`.
+would put a file where it was. A trace, which grows while a cell runs, is written by
+`firable.executor.operating.recorder`; it may be a pipe, if somebody reads it (`open_at_once`).
 """
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Final
 
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.source import printable
@@ -41,6 +43,22 @@ def write_whole(path: str | Path, data: bytes | str) -> None:
         finally:  # nothing is left behind, whatever ended the writing
             with suppress(OSError, ValueError):
                 unfinished.unlink(missing_ok=True)
+
+
+UNREAD: Final = "it is a pipe that nobody reads"
+"""Why a named pipe is not opened."""
+
+
+def open_at_once(path: str | Path, flags: int) -> int:
+    """Open a file that is written line by line, and wait for nobody: a pipe that nobody reads is an `OSError`."""
+    try:
+        descriptor = os.open(path, flags | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
+    except OSError as error:
+        if error.errno != errno.ENXIO:
+            raise
+        raise OSError(errno.ENXIO, UNREAD) from None
+    os.set_blocking(descriptor, True)
+    return descriptor
 
 
 def make_folder(path: str | Path) -> None:

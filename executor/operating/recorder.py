@@ -35,6 +35,7 @@ from firable.executor.protocol.token_player import TokenPlayer
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.net import Marking, Net
 from firable.nets.source import printable
+from firable.nets.writing import UNREAD, open_at_once
 from firable.semantics.joining import APPLIED, STANDS, VOTED
 from firable.semantics.trace import CommandSent, End, Event, Fired, Header, Noted, SignalChanged, Start
 
@@ -67,7 +68,8 @@ class TraceFile:
         """Where the file is cut before the first line; None when that is done."""
         with self._failures():
             mode = "r+" if size_bytes or Path(path).is_file() else "w"
-            self.file = FileIO(path, mode)  # no buffer, whose lock a write that hangs would hold
+            # No buffer, whose lock a write that hangs would hold.
+            self.file = FileIO(path, mode, opener=open_at_once)
             if size_bytes and self.file.seek(0, os.SEEK_END) < size_bytes:
                 self.file.close()
                 raise ValueError(_SHORT)
@@ -112,6 +114,8 @@ class TraceFile:
                 hint = (
                     "put the trace of this run back as it was, or leave --trace out: it cannot be begun in the middle"
                 )
+            if reason == UNREAD:
+                hint = "start who reads it before the run, or name a file"
             if isinstance(error, OSError) and error.errno in {errno.ENOSPC, errno.EDQUOT}:
                 hint = "make room on its disk; with --journal, the same command then takes the run up"
             raise InputError([Diagnostic("F1017", message, hint)]) from None

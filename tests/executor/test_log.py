@@ -5,6 +5,9 @@ from __future__ import annotations
 import io
 import json
 import logging
+import os
+import subprocess
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -131,3 +134,28 @@ def test_a_run_that_is_refused_before_it_begins_leaves_no_log(tmp_path: Path) ->
         assert log is not None
         log.ended(Situation(State.STOPPED, ()))
     assert lines(path.read_text())[0]["event"] == "ended"
+
+
+@pytest.mark.parametrize("option", ["--log", "--trace"])
+def test_a_pipe_that_nobody_reads_is_refused_at_once_and_one_that_is_read_is_written(
+    option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bundle, pipe = str(tmp_path / "cell.bundle"), tmp_path / "pipe"
+    assert main(["bundle", "catalogue:one_robot", "-o", bundle]) == 0
+    os.mkfifo(pipe)
+    command = [sys.executable, "-m", "firable.cli", "run", bundle, "--workpieces", "1", option, str(pipe)]
+    refused = subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
+    assert refused.returncode == 2
+    assert "error[F1017]" in refused.stderr
+    assert "it is a pipe that nobody reads" in refused.stderr
+    assert "start who reads it before the run" in refused.stderr
+    reading = subprocess.Popen(["cat", str(pipe)], stdout=subprocess.PIPE, text=True)
+    keeping = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)  # or the run might come before the reader
+    try:
+        subprocess.run(command, capture_output=True, check=True, timeout=PATIENCE_S)
+        said, _ = reading.communicate(timeout=PATIENCE_S)
+    finally:
+        os.close(keeping)
+        reading.kill()
+    written = lines(said)
+    assert [line.get("event") for line in written] == ["began", "ended"] if option == "--log" else len(written) > 9
