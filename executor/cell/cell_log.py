@@ -10,9 +10,13 @@ was at the last input, with what it shows and what became of each command.
 
 A line that was cut off, because the process was killed while it wrote, is an input that the cell never got. Each line
 ends with a check value over itself and all before it: of inputs that have changed, or that are missing in the middle, a
-cell would be made that is somewhere else than the journal left it, and nobody could tell. Rejected: the cell as a
-server process, which would also outlive its controller, and have no virtual time; `firable sim` is that, for real time.
-Rejected: pickling the cell, which would tie the file to the code and run what it reads.
+cell would be made that is somewhere else than the journal left it, and nobody could tell. Lines that are missing at the
+end no check value tells of, so the journal keeps with each sync how many there were, and the check value of the last
+one (`mark`). Each is written before that sync, so a process that is killed leaves as many or more; fewer are left by
+a power cut, for they are not synced, or by somebody who has put back an old log, and then the machines would stand
+where they have been before. Rejected: the cell as a server process, which would also outlive its controller, and have
+no virtual time; `firable sim` is that, for real time. Rejected: pickling the cell, which would tie the file to the code
+and run what it reads.
 """
 
 from __future__ import annotations
@@ -21,7 +25,7 @@ import errno
 import hashlib
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, NoReturn
@@ -33,6 +37,10 @@ from firable.nets.source import printable
 
 VERSION: Final = 2
 """1 had no check values."""
+
+PUT_BACK: Final = "put it back, or begin with a new journal: its machines would not be where the journal left them"
+"""What to do about a log that is not what it was."""
+_WRITTEN: Final = "its journal was written last"
 
 Input = tuple[float, str, tuple[str | int, ...]]
 """When, what, and with which arguments."""
@@ -70,7 +78,13 @@ class CellLog:
                 if (its := _format_of(first)) not in {None, VERSION}:
                     self._refuse(f"it has format {its}, and this firable writes {VERSION}")
                 self._refuse(f"it is not of {workpieces} workpieces with the seed {seed} in this plant '{plant.plant}'")
-            self.past: tuple[Input, ...] = tuple(map(self._input, lines))
+            past, checks = [], [self.check]
+            for line in lines:
+                past.append(self._input(line))
+                checks.append(self.check)
+            self.past: tuple[Input, ...] = tuple(past)
+            self.past_checks = tuple(checks)
+            self.count = len(past)
             with self._failures():
                 os.truncate(self.descriptor, len(whole))  # now that it is known to be ours
             if self.is_new:
@@ -84,9 +98,23 @@ class CellLog:
         """When the last input came."""
         return self.past[-1][0] if self.past else 0.0
 
+    @property
+    def mark(self) -> list[int]:
+        """How many inputs there were so far, and the check value of the last."""
+        return [self.count, self.check]
+
+    def demand(self, mark: Sequence[object]) -> None:
+        """Refuse (F5035) a log that has not been where this mark was made."""
+        count, check = mark
+        if not isinstance(count, int) or count >= len(self.past_checks):
+            self._refuse(f"it has {len(self.past)} of the {count} inputs that it had when {_WRITTEN}", PUT_BACK)
+        if self.past_checks[count] != check:
+            self._refuse(f"its first {count} inputs are not those that it had when {_WRITTEN}", PUT_BACK)
+
     def add(self, at_seconds: float, what: str, *arguments: str | int) -> None:
         """Write an input, before it has its effect."""
         self._write([at_seconds, what, *arguments, self._checked([at_seconds, what, *arguments])])
+        self.count += 1
 
     def close(self) -> None:
         """Close the file."""
@@ -115,9 +143,9 @@ class CellLog:
         self.check = crc32(json.dumps(item).encode(), self.check)
         return self.check
 
-    def _refuse(self, why: str) -> NoReturn:
+    def _refuse(self, why: str, hint: str = "run it as it was begun, or name another folder") -> NoReturn:
         message = f"{printable(str(self.path))}: not the simulated cell of this run: {why}"
-        raise InputError([Diagnostic("F5035", message, "run it as it was begun, or name another folder")]) from None
+        raise InputError([Diagnostic("F5035", message, hint)]) from None
 
     @contextmanager
     def _failures(self) -> Iterator[None]:

@@ -29,6 +29,7 @@ from io import FileIO
 from pathlib import Path
 from typing import Final, Protocol
 
+from firable.executor.cell.cell_log import CellLog
 from firable.executor.protocol.enabled import EnabledSet
 from firable.executor.protocol.messages import Keep, ProtocolError, Stored
 from firable.executor.protocol.token_player import TokenPlayer
@@ -127,6 +128,8 @@ HELD_BACK_MAX: Final = 1000
 """So many lines wait at most until they may be written: the journal keeps them with each group until then."""
 KEY: Final = "trace"
 """Under which the journal keeps what a restart needs to go on with a trace."""
+CELL: Final = "cell"
+"""Under which that is how far the log of a simulated cell was."""
 
 
 class Recorder:
@@ -146,7 +149,10 @@ class Recorder:
         machines: tuple[str, ...] = (),
         began: float = 0.0,
         start: Start | None = None,
+        cell: CellLog | None = None,
     ) -> None:
+        self.cell = cell
+        """The log of the simulated cell, of which the journal keeps how far it was."""
         self.machines = machines
         self.began = float(str(kept.get("began", began))) if isinstance(kept, Mapping) else began
         self.player = TokenPlayer.of(net)
@@ -192,6 +198,8 @@ class Recorder:
             "size_bytes": self.size_bytes,
             "lines": "".join(self.unwritten) if self.unwritten else "",
         }
+        if self.cell is not None:
+            now[CELL] = list(self.cell.mark)
         return [Keep(KEY, now | {"began": repr(self.began)} if self.machines else now)]
 
     @property

@@ -16,10 +16,10 @@ from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from firable.executor.cell.cell_log import CellLog
+from firable.executor.cell.cell_log import PUT_BACK, CellLog
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.journal.sqlite_journal import SqliteJournal
-from firable.executor.operating.recorder import KEY, TRACE, LineStream, Recorder, TraceFile, size_bytes_of
+from firable.executor.operating.recorder import CELL, KEY, TRACE, LineStream, Recorder, TraceFile, size_bytes_of
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import Stored
@@ -74,7 +74,7 @@ def opened(
         kept = journal.kept(TRACE).get(KEY)
         begun = any(journal.kept(name) for name in names)
         if cell is not None and begun:
-            _demand_the_cell(cell, net)
+            _demand_the_cell(cell, net, kept)
         is_taken_over = begun and kept is None
         if isinstance(trace, Path | str):
             if begun and not is_taken_over:
@@ -82,7 +82,7 @@ def opened(
             trace = stack.enter_context(closing(TraceFile(trace, size_bytes_of(kept))))
         now = time.time() if machines else 0.0
         start = start_of(decomposition, names, journal) if is_taken_over else None
-        recorder = Recorder(net, net_digest(net), trace, kept, machines, now, start)
+        recorder = Recorder(net, net_digest(net), trace, kept, machines, now, start, cell)
         last = max(recorder.at_seconds, cell.end_seconds if cell is not None else 0.0, now - recorder.began)
         yield Files(journal, recorder, cell, last, begun)
 
@@ -104,15 +104,17 @@ def _lines_of(kept: Stored | None) -> str:
     return str(kept["lines"]) if isinstance(kept, dict) else ""
 
 
-def _demand_the_cell(cell: CellLog, net: Net) -> None:
+def _demand_the_cell(cell: CellLog, net: Net, kept: Stored | None) -> None:
     """What the journal tells of was done to this simulated cell, by places that the net still has."""
     message = f"{printable(str(cell.path))}: the simulated cell of this journal is empty or gone"
-    hint = "put it back, or begin with a new journal: its machines would not be where the journal left them"
+    hint = PUT_BACK
     sent = {str(arguments[0]) for _, what, arguments in cell.past if what == "send" and arguments}
     if unknown := sorted(place for place in sent if place not in net.place_index):
         message = f"{printable(str(cell.path))}: the simulated cell was commanded by '{unknown[0]}', which is no place"
         hint = "a simulated cell is taken over only by a net that keeps the places which have commanded it"
     elif not cell.is_new:
+        if isinstance(kept, dict) and isinstance(mark := kept.get(CELL), list):
+            cell.demand(mark)
         return
     raise InputError([Diagnostic("F5035", message, hint)])
 

@@ -5,6 +5,7 @@ import errno
 import io
 import json
 import os
+import re
 import subprocess
 import sys
 from collections import Counter
@@ -231,6 +232,33 @@ def test_log_of_a_cell_in_which_a_line_is_missing_is_refused(tmp_path: Path) -> 
     code, message = refused(tmp_path)
     assert code == "F5035"
     assert "does not follow on the one before" in message
+
+
+def test_log_of_a_cell_that_is_shorter_than_its_journal_says_is_refused_and_one_that_is_longer_is_not(
+    tmp_path: Path,
+) -> None:
+    """Of what the cell was given after the last sync, by nobody as well, the journal does not know."""
+    run_here(tmp_path, seconds=20.0)
+    log = tmp_path / "cell.journal.cell"
+    header, *inputs = log.read_text("utf-8").splitlines(keepends=True)
+    log.write_text("".join([header, *inputs[:1]]), "utf-8")
+    code, message = refused(tmp_path)
+    assert code == "F5035"
+    told = re.search(r"it has 1 of the (\d+) inputs that it had when its journal was written last", message)
+    assert told is not None
+    synced = int(told[1])
+    assert 5 < synced <= len(inputs)
+    log.write_text("".join([header, *inputs[: synced - 1]]), "utf-8")
+    assert f"it has {synced - 1} of the {synced} inputs" in refused(tmp_path)[1]
+    log.unlink()
+    with closing(CellLog(log, plant_of("one_robot"), 2, 0)) as other:
+        for at in range(synced + 3):
+            other.add(float(at), "advance")
+    assert f"its first {synced} inputs are not those that it had" in refused(tmp_path)[1]
+    log.write_text("".join([header, *inputs[:synced]]), "utf-8")
+    with closing(CellLog(log, plant_of("one_robot"), 2, 0)) as longer:
+        longer.add(longer.end_seconds + 1, "advance")
+    assert run_here(tmp_path)[0].state is State.HELD
 
 
 def test_log_of_a_cell_of_another_format_is_refused_by_it(tmp_path: Path) -> None:
