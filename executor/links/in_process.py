@@ -13,7 +13,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterable
 
-from firable.executor.links.link import Greeting, LinkListener, come_back_without, objection
+from firable.executor.links.link import QUESTION, Greeting, LinkListener, come_back_without, objection
 from firable.executor.links.standing import Standing
 from firable.executor.protocol.messages import Message
 
@@ -69,6 +69,11 @@ class InProcessLink:
         self.listener: LinkListener | None = None
         self.peers: dict[str, InProcessLink] = {}
         self.standing = Standing.GOING
+
+    @property
+    def question(self) -> str:
+        """What there is to ask, of a host that was never reached."""
+        return QUESTION
 
     async def run(self, listener: LinkListener) -> None:
         """Be reached until cancelled."""

@@ -100,8 +100,17 @@ class LinkListener(Protocol):
         ...
 
 
+QUESTION: Final = "is its host started, and the address right?"
+"""What there is to ask of a host that never comes, over most links."""
+
+
 class Link(Protocol):
     """The way to the other hosts."""
+
+    @property
+    def question(self) -> str:
+        """What there is to ask, of a host that was never reached."""
+        ...
 
     async def run(self, listener: LinkListener) -> None:
         """Serve until cancelled; raises `InputError` F5021 where the link cannot be opened."""

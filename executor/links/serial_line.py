@@ -129,6 +129,11 @@ class SerialLink:
         self.awake = asyncio.Event()
         self.broken: asyncio.Future[None] | None = None
 
+    @property
+    def question(self) -> str:
+        """What there is to ask, of a host that was never reached."""
+        return "is its host started, at this line, and with the same --baud?"
+
     async def run(self, listener: LinkListener) -> None:
         """Serve until cancelled; raises `InputError` F5021 where the port cannot be opened, or breaks."""
         loop = asyncio.get_running_loop()

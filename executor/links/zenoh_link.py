@@ -46,7 +46,7 @@ import zenoh
 from firable.executor.links.claims import Answer, Claims, Said
 from firable.executor.links.encoding import EncodingError, pack, unpack
 from firable.executor.links.lending import LendingLoop
-from firable.executor.links.link import COORDINATOR, Arrival, Greeting, LinkListener, cannot_open, objection
+from firable.executor.links.link import COORDINATOR, QUESTION, Arrival, Greeting, LinkListener, cannot_open, objection
 from firable.executor.links.standing import Standing
 from firable.executor.links.storages import Storage
 from firable.executor.protocol.messages import Message
@@ -107,6 +107,15 @@ class ZenohLink:
         self.is_woken = False
         self.lending: LendingLoop | None = None
         """The event loop, if it lends itself."""
+
+    @property
+    def question(self) -> str:
+        """What there is to ask, of a host that was never reached: why, Zenoh keeps to itself."""
+        if self.certificates is None:
+            return QUESTION
+        return (
+            f"{QUESTION} is the certificate of each of the authority that the other names with --tls, and not expired?"
+        )
 
     async def run(self, listener: LinkListener) -> None:
         """Serve until cancelled; raises `InputError` F5021 where an address cannot be listened at."""

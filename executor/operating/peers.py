@@ -334,5 +334,5 @@ class Peers:
 
     def _missing(self, name: str) -> str:
         """What is said of one that has not come: it was refused, or nobody has heard of it."""
-        unheard = f"{called(name)} was never reached: is its host started, and the address right?"
-        return self.turned_away.get(name, unheard)
+        question = "" if self.link is None else f": {self.link.question}"
+        return self.turned_away.get(name, f"{called(name)} was never reached{question}")

@@ -156,6 +156,34 @@ def test_a_certificate_that_has_expired_is_refused_before_it_is_shown(
     )
 
 
+def test_hosts_whose_certificates_are_of_two_authorities_are_asked_for_them(bundle: str, tmp_path: Path) -> None:
+    at, hosts = f"tls/127.0.0.1:{free_port()}", []
+    try:
+        for name, way in (("system", "--listen"), ("robot", "--join")):
+            own = Site(tmp_path / name).host(name)
+            command = ["run", bundle, "--controller", name, "--dry-run", "1", way, at]
+            command += ["--tls", own.authority, own.certificate, own.key]
+            hosts.append(
+                subprocess.Popen(
+                    [sys.executable, "-m", "firable.cli", *command],
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.PIPE,
+                    text=True,
+                )
+            )
+        for host in hosts:
+            assert host.stderr is not None
+            with heard_in_time(host):
+                told = next(line for line in host.stderr if "was never reached" in line)
+            assert (
+                "is the certificate of each of the authority that the other names with --tls, and not expired?" in told
+            )
+    finally:
+        for host in hosts:
+            host.kill()
+            host.communicate()
+
+
 def test_hosts_whose_authority_has_expired_are_refused_before_they_are_linked(
     bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
