@@ -67,7 +67,8 @@ async def take_up(run: Host, found: TakingUp) -> None:
             if answer is Answer.UNKNOWN:
                 run.told("held", f"nobody knows what became of the command of '{place}': look, and --say it")
     tell_unasked(run, found.answers)
-    if not (found.resume or run.operated or run.served):  # then the run ends by telling how the cell stands
+    goes_on = found.resume and not uncertain(run)
+    if not (goes_on or run.operated or run.served):  # then the run ends by telling how the cell stands
         await run.driver.met()
     await run.quiet()
     if run.is_over:  # by an error: nothing is resumed any more

@@ -50,9 +50,9 @@ def installed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kinds, "entry_points", lambda **_: found)
 
 
-def host(journal: Journal) -> Host:
+def host(journal: Journal, *, resume: bool = False) -> Host:
     recorder = Recorder(NET, net_digest(NET), io.StringIO(), journal.kept(TRACE).get(KEY))
-    return Host(split(NET), bound_driver(parse_binding(BINDING), NET), recorder, journal=journal)
+    return Host(split(NET), bound_driver(parse_binding(BINDING), NET), recorder, journal=journal, resume=resume)
 
 
 async def interrupted(*ends: MemoryEnd) -> Journal:
@@ -87,15 +87,18 @@ def test_an_operator_of_a_held_run_is_heard_while_a_device_is_away_that_nobody_a
     run_in_virtual_time(main())
 
 
+@pytest.mark.parametrize("resume", [False, True])
 @pytest.mark.parametrize(("comes_after_s", "is_told"), [(0.0, False), (2.0, False), (60.0, True)])
 def test_a_held_run_says_of_no_device_that_it_is_not_connected_before_its_start_is_over(
-    comes_after_s: float, is_told: bool
+    comes_after_s: float, is_told: bool, resume: bool
 ) -> None:
     async def main() -> None:
         answering, late = MemoryEnd("A"), MemoryEnd("B")
         journal = await interrupted(answering, late)
+        if resume:  # held all the same: nobody knows what became of its command
+            answering.values.update({"taken": "?", "done": "?"})
         await late.cut()
-        held = asyncio.create_task(host(journal).main())
+        held = asyncio.create_task(host(journal, resume=resume).main())
         begun = asyncio.get_running_loop().time()
         asyncio.get_running_loop().call_later(comes_after_s, lambda: asyncio.ensure_future(late.mend()))
         ended = await held
