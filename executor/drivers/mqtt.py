@@ -83,7 +83,13 @@ class MqttConnection(Stepwise):
 
     async def open(self) -> None:
         """Connect, and subscribe to what is wanted."""
-        await self.client.__aenter__()
+        try:
+            await self.client.__aenter__()
+        except asyncio.CancelledError:
+            # As aiomqtt does where its own time is over: else the end of the connection is asked what nobody answers,
+            # and that is an error that the event loop tells at the terminal.
+            self.client._connected = asyncio.get_running_loop().create_future()
+            raise
         await self.client.subscribe([(topic, 1) for topic in (*self.wanted.read, self.own)])
         await self.client.publish(self.own, "1", qos=1, timeout=self.wanted.timeout_s)
 

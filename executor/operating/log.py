@@ -35,13 +35,16 @@ TURNED_AWAY: Final = "not let in"
 NOT_OBEYED: Final = "not obeyed"
 """The kind of note of a command of an operator that was refused."""
 
+UNHANDLED: Final = "unhandled"
+"""The kind of note of an error that nobody has handled, in a callback of a library most of all."""
+
 LEVELS: Final[Mapping[str, int]] = MappingProxyType(
     {
         **dict.fromkeys(("fault", "divergence", "emergency stop", "latched", HANGS), logging.ERROR),
         **dict.fromkeys(
             ("lost", "refused", "never-met", "dropped", "held", "unasked", "withdrawn", "untold"), logging.WARNING
         ),
-        **dict.fromkeys((FROZEN, TURNED_AWAY, NOT_OBEYED, UNWATCHED), logging.WARNING),
+        **dict.fromkeys((FROZEN, TURNED_AWAY, NOT_OBEYED, UNWATCHED, UNHANDLED), logging.WARNING),
     }
 )
 """The level of each kind of note; of all others it is `info`."""

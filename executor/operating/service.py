@@ -9,18 +9,20 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import traceback
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.bound import BoundDriver
 from firable.executor.drivers.driver import Driver, Quality
 from firable.executor.operating.host import Host
-from firable.executor.operating.log import FROZEN
+from firable.executor.operating.log import FROZEN, UNHANDLED
 from firable.executor.operating.situation import Situation
 from firable.executor.operating.uncut import STOP_SECONDS, Guard, Patience, ended_by_signals
 from firable.executor.own_time import OwnTimeLoop
@@ -89,7 +91,35 @@ def _loop_for(host: Host) -> asyncio.AbstractEventLoop:
 
         loop = LendingLoop()
     loop.listening.thawed = partial(_tell_thawed, host, loop)
+    if host.tell is not None or host.log is not None:
+        loop.set_exception_handler(partial(_left, host))
     return loop
+
+
+def _left(host: Host, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """Have an error told in a line, which asyncio would write to the terminal with all its calls.
+
+    What runs beside the host is awaited, and its errors end the run: this is what libraries let fall.
+    """
+    if loop.is_closed():  # nobody would hear of it
+        loop.default_exception_handler(context)
+        return
+    loop.call_soon_threadsafe(host.told, UNHANDLED, unhandled(context))
+
+
+def unhandled(context: Mapping[str, Any]) -> str:
+    """An error that nobody has handled, in a sentence with the place where it was raised.
+
+    >>> unhandled({"message": "Exception in callback", "exception": ValueError("no number")})
+    'an error that nobody has handled: Exception in callback: ValueError: no number'
+    """
+    error = context.get("exception")
+    told = ["an error that nobody has handled", str(context.get("message", "")).rstrip(".")]
+    if isinstance(error, BaseException):
+        told += [type(error).__name__, str(error)]
+        if calls := traceback.extract_tb(error.__traceback__):
+            told.append(f"{'/'.join(Path(calls[-1].filename).parts[-2:])}, line {calls[-1].lineno}")
+    return ": ".join(filter(None, told))
 
 
 def _tell_thawed(host: Host, loop: OwnTimeLoop, seconds: float) -> None:

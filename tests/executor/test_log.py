@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 import json
 import logging
@@ -17,7 +18,7 @@ from support.cells import decomposition_of, plant_of
 
 from firable.cli.log import log_to
 from firable.cli.main import main
-from firable.executor import State, Watch, execute
+from firable.executor import Host, State, Watch, execute
 from firable.executor.cell.disturbances import NeverCompletes
 from firable.executor.drivers.bench import PATIENCE_S
 from firable.executor.operating.log import Log, logger_to
@@ -159,3 +160,31 @@ def test_a_pipe_that_nobody_reads_is_refused_at_once_and_one_that_is_read_is_wri
         reading.kill()
     written = lines(said)
     assert [line.get("event") for line in written] == ["began", "ended"] if option == "--log" else len(written) > 9
+
+
+def test_an_error_that_a_library_lets_fall_is_a_line_of_the_log_and_no_traceback_at_the_terminal(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    def let_fall() -> None:
+        raise asyncio.CancelledError  # which no `except Exception` of a library takes
+
+    async def operator(_: Host) -> None:
+        asyncio.get_running_loop().call_soon(let_fall)
+
+    path = tmp_path / "run.log"
+    with log_to(str(path)) as log:
+        execute(
+            decomposition_of("one_robot"),
+            plant_of("one_robot"),
+            workpieces=1,
+            speed=1000.0,
+            watch=Watch.IGNORE,
+            operator=operator,
+            log=log,
+        )
+    (told,) = [line for line in lines(path.read_text()) if line["event"] == "unhandled"]
+    assert told["level"] == "warning"
+    assert "an error that nobody has handled: Exception in callback" in told["message"]
+    assert "CancelledError: executor/test_log.py, line " in told["message"]
+    assert not caplog.records
+    assert "Traceback" not in capfd.readouterr().err

@@ -13,11 +13,12 @@ from firable.executor.drivers.bench import Far, until
 from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.bound import BoundDriver
 from firable.executor.drivers.conformance import DriverConformance
-from firable.executor.drivers.device import Point, Value
+from firable.executor.drivers.device import Point, Value, Wanted
 from firable.executor.drivers.far_side.ends import PORTS
 from firable.executor.drivers.far_side.machine import ROLES
 from firable.executor.drivers.far_side.mqtt_device import MqttEnd, mosquitto
 from firable.executor.drivers.far_side.ports import free_port
+from firable.executor.drivers.mqtt import KIND, MqttOptions
 
 ALIVE = "alive: {read: cell/M/button,within_s: 600}"
 """What a broker's device needs for an emergency stop; here it does not change."""
@@ -84,6 +85,24 @@ def test_a_cell_whose_broker_has_died_ends_and_says_so(
     assert main(command) == 2
     said = capsys.readouterr().err
     assert "error[F5104]: the cell cannot be served any more: mqtt: its broker, mosquitto, has ended" in said
+
+
+@needs_mosquitto
+def test_a_connection_that_is_given_up_before_a_frozen_broker_has_answered_leaves_no_error_to_the_event_loop() -> None:
+    async def main() -> list[object]:
+        left: list[object] = []
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: left.append(context))
+        end = MqttEnd({"cell/lamp"})
+        await end.start(lambda _point, _value: None)
+        end.faults.silent = True
+        connecting = KIND.connect(MqttOptions(host="127.0.0.1", port=end.port), Wanted(("cell/key",), timeout_s=0.5))
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(connecting, 0.2)
+        end.faults.silent = False
+        await end.stop()
+        return left
+
+    assert asyncio.run(main()) == []
 
 
 @needs_mosquitto
