@@ -163,8 +163,9 @@ class ArbiterDocument(StrictDocument):
     among: Names = Field(description="The transitions that compete, in the order that `by` speaks of.")
     by: Literal["priority", "order", "rotation"] = Field(
         default="priority",
-        description="priority: always in this order. rotation: who has won goes to the end. "
-        "order: in this sequence, which may name one of them more than once.",
+        description="priority: always in this order. rotation: turned so that who has won stands last; of several who "
+        "win in one step, those who stand before the first who loses. order: in this sequence, which may name one of "
+        "them more than once, and is read on from behind who has won in the same way.",
     )
 
 

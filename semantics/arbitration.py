@@ -8,18 +8,23 @@ The paper's alternative, an arbiter for each place, loses maximality on chains a
 Three rules give the order of preference:
 
 - *priority*: always the order of `among`. A live transition can starve under it, which is a verdict of its own.
-- *rotation*: the order of `among`, turned so that the last winner of an input conflict stands last.
+- *rotation*: the order of `among`, turned so that who has won an input conflict stands last.
 - *order*: a specified sequence that may name a transition more than once (`[G6, G6, G2]`: twice G6 for once G2), read
-  from behind the entry that won the last input conflict. Rotation is the case in which each is named once.
+  on from behind the entry that has won an input conflict. Rotation is the case in which each is named once.
 
-A transition wins an input conflict when it is granted while an enabled one that shares an input with it is not.
-Transitions of a component that its arbiter does not name come last, in the order of the file; so does everything in a
-component without an arbiter, which is decided by the order of the file.
+A transition wins an input conflict when it is granted while an enabled one that shares an input with it is not, and
+that one loses it. Where several win in one step, the sequence goes on behind those of them that stand before the first
+who loses, so that nobody who loses is passed over. Going on behind the last of them was rejected: of `[t, u, v]`, where
+t beats u whenever v beats another, u would never have its turn.
+
+Transitions of a component that its arbiter does not name come last, in the order of the file, and turn nothing; so does
+everything in a component without an arbiter, which is decided by the order of the file.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
@@ -46,13 +51,19 @@ class Group:
         """The members in order of preference, each once."""
         return tuple(dict.fromkeys((*self.sequence[turn:], *self.sequence[:turn], *self.rest)))
 
-    def turn_after(self, winner: int, turn: int) -> int:
-        """The turn after `winner` won an input conflict."""
-        if self.by is ArbitrationRule.PRIORITY or winner not in self.sequence:
+    def turn_after(self, winners: AbstractSet[int], losers: AbstractSet[int], turn: int) -> int:
+        """The turn after these won and those lost an input conflict, all in one step."""
+        if self.by is ArbitrationRule.PRIORITY:
             return turn
-        length = len(self.sequence)
-        place = next(i for i in range(length) if self.sequence[(turn + i) % length] == winner)
-        return (turn + place + 1) % length
+        after, length, served = turn, len(self.sequence), set[int]()
+        for place in range(turn, turn + length):
+            t = self.sequence[place % length]
+            if t in losers or t in served:  # its turn is still to come
+                break
+            if t in winners:
+                served.add(t)
+                after = (place + 1) % length
+        return after
 
 
 @dataclass(frozen=True)
@@ -144,12 +155,22 @@ class Arbitration:
                 else [t for t in group.preference(turns[g]) if t in candidates]
             )
             won = self.conflicts.maximal(preference)
-            lost = candidates - won
-            for t in preference if lost and group.by is not ArbitrationRule.PRIORITY else ():
-                if t in won and self.conflicts.input_rivals[t] & lost:
-                    after[g] = group.turn_after(t, turns[g])
+            after[g] = self.turn_after(g, won, candidates, turns[g])
             granted |= won
         return tuple(sorted(granted)), tuple(after)
+
+    def turn_after(self, g: int, fired: AbstractSet[int], enabled: AbstractSet[int], turn: int) -> int:
+        """The turn of group `g` after these of its enabled transitions have fired together."""
+        group, rivals = self.groups[g], self.conflicts.input_rivals
+        passed = enabled - fired
+        if not passed or group.by is ArbitrationRule.PRIORITY:
+            return turn
+        winners, losers = set[int](), set[int]()
+        for t in fired:
+            if beaten := rivals[t] & passed:
+                winners.add(t)
+                losers |= beaten
+        return group.turn_after(winners, losers, turn)
 
 
 def per_place_choice(orders: Mapping[str, Sequence[int]], enabled: Iterable[int]) -> FiringSet:

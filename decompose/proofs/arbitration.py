@@ -7,7 +7,8 @@ that shares a place stands in one group only (the facts, and O2), and whatever s
 it is enabled. So one obligation for each group is the whole statement, over every set of enabled members:
 
 - the group grants what the central arbiter grants, in every turn;
-- what wins an input conflict, and so turns a rotation, is the same, so that the turns stay the same for ever;
+- what wins an input conflict is the same, whatever is enabled, and so is what loses it: of two enabled alone, one wins
+  where they share an input. That turns a rotation, so the turns stay the same for ever;
 - what is granted consumes and produces each place at most once, and leaves out nothing that could be added.
 
 The turn is a variable, not a case: the sequence is written twice in a row, and a preference begins where the first

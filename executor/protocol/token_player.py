@@ -243,8 +243,8 @@ class Arbiter:
             return True
         if t not in self.arbitration.decide(candidates, self.turns)[0]:
             return False
-        if (g := self.group_of.get(t)) is not None and self.arbitration.conflicts.input_rivals[t] & candidates:
-            turn = self.arbitration.groups[g].turn_after(t, self.turns[g])
+        if (g := self.group_of.get(t)) is not None:
+            turn = self.arbitration.turn_after(g, {t}, candidates, self.turns[g])
             self.turns = (*self.turns[:g], turn, *self.turns[g + 1 :])
         return True
 

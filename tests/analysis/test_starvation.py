@@ -41,6 +41,19 @@ def test_a_fixed_priority_starves_and_rotation_does_not() -> None:
     assert check(two_ways(rotation)).verdict("starvation").holds
 
 
+def test_one_that_no_arbiter_names_does_not_take_the_turn_of_those_that_it_names() -> None:
+    moves = (
+        Transition("t1", ("a",), ("b",)),
+        Transition("t2", ("a",), ("b",)),
+        Transition("u", ("x",), ("y",)),
+        Transition("link", ("a", "x"), ("b", "y")),
+        Transition("back", ("b", "y"), ("a", "x")),
+    )
+    places = (Place("a", marked=True), Place("x", marked=True), Place("b"), Place("y"))
+    turn = Arbiter("turn", ("t1", "t2"), ArbitrationRule.ROTATION)
+    assert check(Net("rotation", places, moves, arbiters=(turn,))).verdict("starvation").subjects == ("link",)
+
+
 def test_without_an_arbiter_the_order_of_the_file_is_the_priority() -> None:
     assert check(two_ways()).verdict("starvation").subjects == ("t2", "t4")
 

@@ -409,8 +409,9 @@ def test_choice_is_what_the_arbiter_decides_in_every_turn(data: st.DataObject) -
         for t in (*group.sequence, *group.rest):
             assert value(chosen.granted[f"t{t}"], assignment) == (t in decided)
         if turned:
-            winners = [t for t in group.preference(turn) if value(chosen.winning[f"t{t}"], assignment)]
-            assert then == (group.turn_after(winners[-1], turn) if winners else turn)
+            winners = {t for t in group.preference(turn) if value(chosen.winning[f"t{t}"], assignment)}
+            losers = {t for t in enabled - set(decided) if arbiters.conflicts.input_rivals[t] & winners}
+            assert then == group.turn_after(winners, losers, turn)
 
 
 def test_net_and_table_share_every_step_of_the_choice_and_no_step_is_an_or_of_ors() -> None:

@@ -2,6 +2,7 @@
 
 import random
 from copy import copy
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -19,6 +20,7 @@ from firable.executor.protocol.enabled import EnabledSet, bits
 from firable.executor.protocol.messages import Firing
 from firable.executor.protocol.token_player import Arbiter, TokenPlayer
 from firable.nets.decomposition import ArbitrationGroup
+from firable.nets.net import Arbiter as NetArbiter
 from firable.nets.net import ArbitrationRule, Controller, Net, Place, Transition
 from firable.semantics.arbitration import Arbitration
 
@@ -74,9 +76,9 @@ def chosen_by_looking_at_all(
         return next(iter(candidates)), turns
     granted, _ = arbitration.decide(candidates, turns)
     chosen = min(granted, key=lambda t: (t - last - 1) % count)
-    if arbitration.conflicts.input_rivals[chosen] & candidates:
+    if losers := arbitration.conflicts.input_rivals[chosen] & candidates:
         turns = tuple(
-            group.turn_after(chosen, turn) if chosen in group.sequence else turn
+            group.turn_after({chosen}, losers, turn) if chosen in group.sequence else turn
             for group, turn in zip(arbitration.groups, turns, strict=True)
         )
     return chosen, turns
@@ -104,6 +106,33 @@ def test_choice_among_rivals_alone_is_the_choice_among_all(by: ArbitrationRule) 
                 )
                 assert arbiter.choose(net.transitions[t].name for t in candidates) == net.transitions[last].name
                 assert arbiter.turns == turns
+
+
+@pytest.mark.parametrize("by", ArbitrationRule)
+def test_turn_of_a_controller_is_that_of_the_whole_net_where_one_transition_is_granted(by: ArbitrationRule) -> None:
+    """Interleaving and steps make the same choice there, so a rotation must go on alike."""
+    compared = 0
+    for seed in range(60):
+        draw, net = random.Random(seed), owned_net(seed)
+        members = [[net.transitions[t].name for t in g.rest] for g in Arbitration.of(net).groups]
+        named = [(names, draw.sample(names, draw.randint(2, len(names)))) for names in members]
+        whole = Arbitration.of(
+            replace(net, arbiters=tuple(NetArbiter(f"g{g}", tuple(its), by) for g, (_, its) in enumerate(named)))
+        )
+        groups = (
+            ArbitrationGroup(f"g{g}", tuple(its), tuple(m for m in names if m not in its), by)
+            for g, (names, its) in enumerate(named)
+        )
+        arbiter, turns = Arbiter(net, groups), whole.first_turns
+        for _ in range(30):
+            enabled = {t for t in range(len(net.transitions)) if draw.random() < 0.6}
+            granted, after = whole.decide(enabled, turns)
+            if len(granted) == 1:
+                arbiter.choose(net.transitions[t].name for t in enabled)
+                compared += after != turns
+                turns = after
+                assert arbiter.turns == turns
+    assert (compared == 0) is (by is ArbitrationRule.PRIORITY)
 
 
 def test_deadlock_that_the_recorder_knows_is_that_of_the_net() -> None:

@@ -54,6 +54,47 @@ def test_who_wins_beside_the_conflict_does_not_turn_the_rotation() -> None:
     assert arbitration.decide([0, 1, 2], arbitration.first_turns) == ((0, 1), (1,))
 
 
+def two_contests(among: tuple[str, ...], by: ArbitrationRule) -> Arbitration:
+    """t and u want p, v and x want q; y, which wants both, makes one component of them."""
+    shapes = {"t": ("p",), "u": ("p",), "v": ("q",), "x": ("q",), "y": ("p", "q")}
+    transitions = tuple(Transition(name, inputs) for name, inputs in shapes.items())
+    return Arbitration.of(Net("n", tuple(map(Place, "pq")), transitions, arbiters=(Arbiter("a", among, by),)))
+
+
+def won(arbitration: Arbitration, rounds: int, enabled: tuple[int, ...]) -> list[str]:
+    turns, won = arbitration.first_turns, []
+    for _ in range(rounds):
+        granted, turns = arbitration.decide(enabled, turns)
+        won.append("".join("tuvxy"[t] for t in granted))
+    return won
+
+
+def test_one_that_is_not_named_turns_nothing_when_it_wins() -> None:
+    arbitration = two_contests(("t", "u"), ArbitrationRule.ROTATION)
+    assert won(arbitration, 4, (0, 1, 2, 3, 4)) == ["tv", "uv", "tv", "uv"]
+
+
+def test_of_several_who_win_in_one_step_none_turns_past_one_who_loses() -> None:
+    assert won(two_contests(("t", "u", "v"), ArbitrationRule.ROTATION), 4, (0, 1, 2, 3)) == ["tv", "uv", "tv", "uv"]
+    in_rotation = won(two_contests(("t", "u", "v", "x"), ArbitrationRule.ROTATION), 5, (0, 1, 2, 3))
+    assert in_rotation == ["tv", "uv", "tx", "uv", "tx"]
+
+
+def test_one_named_twice_has_both_its_turns_where_another_wins_beside_it() -> None:
+    arbitration = two_contests(("t", "t", "v", "u"), ArbitrationRule.ORDER)
+    assert won(arbitration, 6, (0, 1, 2, 3)) == ["tv", "tv", "uv"] * 2
+
+
+@given(st.data())
+def test_whoever_is_named_and_stays_enabled_wins_before_the_sequence_is_through(data: st.DataObject) -> None:
+    by = data.draw(st.sampled_from([ArbitrationRule.ORDER, ArbitrationRule.ROTATION]))
+    names = st.lists(st.sampled_from("tuvxy"), min_size=2, max_size=6, unique=by is ArbitrationRule.ROTATION)
+    among = data.draw(names.filter(lambda drawn: len(set(drawn)) > 1))
+    enabled = tuple(sorted(data.draw(st.frozensets(st.integers(0, 4)))))
+    served = "".join(won(two_contests(tuple(among), by), len(among), enabled))
+    assert {name for name in among if "tuvxy".index(name) in enabled} <= set(served)
+
+
 def test_a_conflict_over_an_output_does_not_turn_the_rotation() -> None:
     transitions = (Transition("t", ("p",), ("s",)), Transition("u", ("q",), ("s",)))
     rotation = Arbiter("a", ("t", "u"), ArbitrationRule.ROTATION)
