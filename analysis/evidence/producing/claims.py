@@ -43,6 +43,7 @@ from firable.analysis.evidence.producing.runs import (
 )
 from firable.analysis.evidence.producing.spaces import MARKINGS_MAX, WIDE_MAX, Spaces
 from firable.analysis.evidence.producing.theorems import theorem_on
+from firable.analysis.evidence.producing.unanswered import unanswered
 from firable.analysis.evidence.producing.unfolding import unfolded_markings
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.spaces.reachability import ReachabilityGraph
@@ -101,8 +102,10 @@ class Certifier:
                 return None if found is None else FiringSequence(found.firings)
             case ClaimKind.LOST:
                 return self._lost(claim.state_goal, witness)
-            case ClaimKind.NOT_LTL | ClaimKind.NOT_LEADS_TO:
+            case ClaimKind.NOT_LTL:
                 return None if witness is None else maximal(self.net, self.discipline, witness)
+            case ClaimKind.NOT_LEADS_TO:
+                return None if witness is None else self._unanswered(claim, witness)
             case ClaimKind.LTL:
                 return self._unfolded(claim)
             case ClaimKind.LEADS_TO:
@@ -144,6 +147,14 @@ class Certifier:
         if found is None:
             raise LackingError("some run refutes the formula")
         return Unfolded(found)
+
+    def _unanswered(self, claim: Claim, witness: Witness) -> FiringSequence | None:
+        """The run of the witness, gone on with where it does not go on for ever and may."""
+        if witness.cycle or Player(self.net).deadlocked(self.net.marking(witness.marking)):
+            return FiringSequence(witness.firings, witness.cycle)
+        if self.spaces.asked is None:
+            raise LackingError("there are too many markings to find the run that goes on without an answer")
+        return unanswered(self.spaces.asked, claim, witness)
 
     def _unordered(self, witness: Witness) -> FiringSequence | None:
         """The run, with the step after it that has no order."""
