@@ -245,3 +245,25 @@ def test_a_machine_is_never_stopped_where_no_run_sends_another_command_before_or
     (shown,) = (one for one in check_document(found) if one.record.name == "machine-never-stopped")
     assert not shown.record.proved
     assert shown.shown
+
+
+def machine(name: str, *transitions: Transition) -> Net:
+    """Two places that command one machine, and one that does not."""
+    go, stop = (Place(word.lower(), command=Command("A", word)) for word in ("GO", "STOP"))
+    return Net(name, (Place("idle", marked=True), go, stop), transitions)
+
+
+TOGETHER = machine("together", Transition("both", (), ("go", "stop")), Transition("clear", ("go", "stop")))
+APART = machine(
+    "apart", Transition("t1", (), ("go",)), Transition("t2", ("go",)), Transition("t5", ("idle",), ("stop",))
+)
+
+
+@pytest.mark.parametrize("discipline", list(Discipline))
+@pytest.mark.parametrize("of", [TOGETHER, APART])
+def test_one_run_that_shows_both_commands_to_be_followed_is_claimed_once(of: Net, discipline: Discipline) -> None:
+    found = evidence_of_report(check(of, discipline))
+    assert document_from_text(found.to_text()) == found
+    (shown,) = (one for one in check_document(found) if one.record.name == "machine-never-stopped")
+    assert shown.record.proved
+    assert shown.shown

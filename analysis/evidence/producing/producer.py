@@ -97,12 +97,13 @@ class _Verdicts:
                 shown = list(self._shown(verdict, query, proved))
             except LackingError as error:
                 lacking = str(error)
+        once = {order_of(claim): (claim, certificate) for claim, certificate in reversed(shown)}
+        shown = [once[key] for key in sorted(once)]  # of what is shown twice, the first
         if not self._room.take([certificate for _, certificate in shown]):
             shown, lacking = [], "the document would be larger than what is read"
         claims = [claim for claim, _ in shown]
         if not lacking and not suffices(net, discipline, verdict.name, proved, claims, query):
             lacking = "no certificate is known for this verdict"
-        shown.sort(key=lambda one: order_of(one[0]))
         return Record(verdict.name, proved, tuple(shown), lacking, "" if query is None else format_query(query))
 
     def _one(self, claim: Claim, witness: Witness | None = None) -> Iterator[tuple[Claim, Certificate]]:
@@ -266,20 +267,14 @@ class _Verdicts:
 
     def _stopped(self) -> Iterator[tuple[Claim, Certificate]]:
         """Each command is never sent, or sent in a run that sends another one to the same machine."""
-        dead = set()
         for names in senders(self.net).values():
             for name, sending in names.items():
                 others = dict.fromkeys(t for other, of in names.items() if other != name for t in of)
                 found = self.certifier.run_in_order(sending, tuple(others))
                 if found is not None:
                     yield Claim(ClaimKind.IN_ORDER, fires=found[0]), found[1]
-                elif sending not in dead:
-                    dead.add(sending)
-                    yield from self._never_sent(sending)
-
-    def _never_sent(self, sending: tuple[str, ...]) -> Iterator[tuple[Claim, Certificate]]:
-        goal = some_firable(sending)
-        return self._one(Claim(ClaimKind.NEVER, goal))
+                else:
+                    yield from self._one(Claim(ClaimKind.NEVER, some_firable(sending)))
 
     def _never_stopped(self) -> Iterator[tuple[Claim, Certificate]]:
         """A command that is sent, and beside which no run sends another one to its machine."""
