@@ -27,9 +27,9 @@ from firable.nets.net import Net, Place, Transition
 from firable.nets.pausing import without_cycle_search
 from firable.nets.pnml_writer import write_pnml
 from firable.nets.pnml_xml import PnmlRecords, Record, described, parse_xml
-from firable.nets.source import Source, quoted, read_bytes
+from firable.nets.source import Source, printable, quoted, read_bytes
 from firable.nets.text_positions import bounded
-from firable.nets.well_formed import FORBIDDEN_IN_NAMES
+from firable.nets.well_formed import FORBIDDEN_IN_NAMES, is_name
 
 __all__ = ["PnmlImport", "parse_pnml", "read_pnml", "write_pnml"]
 
@@ -131,7 +131,7 @@ class _Import:
         if self.problems:
             raise InputError(bounded(self.problems))
         name = records.net.labels.get("name") or records.net.id or Path(self.source.file).stem
-        return Net(name, places, transitions)
+        return Net(printable(" ".join(name.split())), places, transitions)
 
     def unique(self, records: Iterable[Record]) -> dict[str, Record]:
         found: dict[str, Record] = {}
@@ -380,7 +380,7 @@ def _integer(text: str) -> int | None:
 
 def _legal(text: str) -> str:
     """The text with an underscore for each character that may not stand in a name; itself where it is a name."""
-    if FORBIDDEN_IN_NAMES.isdisjoint(text) and text.isprintable() and text not in {"", "and", "or", "not", "->"}:
+    if is_name(text) and text not in {"and", "or", "not", "->"}:
         return text
     legal = "".join("_" if c in FORBIDDEN_IN_NAMES or not c.isprintable() else c for c in text)
     return f"_{legal}" if not legal or legal in {"and", "or", "not", "->"} else legal

@@ -33,6 +33,7 @@ from firable.nets.temporal import (
     negated,
 )
 from firable.nets.text_positions import bounded
+from firable.nets.well_formed import is_name
 from firable.nets.xml_tree import Element, parse_elements
 
 _UNARY: Final[dict[str, type[Next | Eventually | Globally]]] = {
@@ -110,6 +111,8 @@ class _Reading:
         formulas = [child for child in element.children if child.tag == "formula"]
         if not name or len(formulas) != 1:
             raise self.refuse(element, "a <property> has an <id> and one <formula>")
+        if not is_name(name):
+            raise self.refuse(element, f"the <id> {quoted(name)} is not a name")
         inner = self.one(formulas[0])
         if inner.tag == "place-bound":
             return Query(name, QueryKind.BOUND, places=self.places(inner))

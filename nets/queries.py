@@ -35,7 +35,7 @@ from firable.nets.source import Source, quoted, read_bytes
 from firable.nets.temporal import Logic, Temporal, format_temporal, logics, parse_temporal
 from firable.nets.temporal_parts import atoms_in
 from firable.nets.text_positions import bounded
-from firable.nets.well_formed import FORBIDDEN_IN_NAMES
+from firable.nets.well_formed import is_name
 
 SIZE_BYTES_MAX: Final = 64 * 1024 * 1024
 PROBLEMS_MAX: Final = 100  # enough to read; a file of noise has millions
@@ -175,7 +175,7 @@ class _Lines:
                 continue
             name, colon, text = line.partition(":")
             column, name = len(name) + len(colon) + len(text) - len(text.lstrip()) + 1, name.strip()
-            if not colon or not name or FORBIDDEN_IN_NAMES & set(name) or not name.isprintable():
+            if not colon or not is_name(name):
                 hint = "write `name: AG not deadlock`, one query a line"
                 self.refuse("F1018", f"no name and colon before the query {quoted(line.strip())}", hint, number, 1)
                 continue

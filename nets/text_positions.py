@@ -125,6 +125,8 @@ class Positions:
         return first, second
 
     def _walk(self) -> Iterator[tuple[Subject, _Found]]:
+        if (cell := value_of(self.tree, "cell")) is not None:
+            yield ("cell",), cell
         for name, key, controller in entries_of(self.tree, "controllers"):
             yield ("controllers", name), key
             if (under := value_of(controller, "under")) is not None:

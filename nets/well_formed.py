@@ -33,8 +33,16 @@ from firable.nets.time_limits import limit_problems
 FORBIDDEN_IN_NAMES: Final = frozenset(" \t\r\n()[]{},:#&*!|>'\"%@`\\")
 
 
+def is_name(text: str) -> bool:
+    """Whether a text may be a name: without blanks, brackets, quotes, YAML signs, and what a terminal would obey."""
+    return bool(text) and FORBIDDEN_IN_NAMES.isdisjoint(text) and text.isprintable()
+
+
 def problems(net: Net) -> Iterator[Diagnostic]:
     """Every rule of SEMANTICS, "The net", that the parts violate, found as it is asked for."""
+    if not net.name.isprintable():
+        hint = "write it on one line, in visible characters"
+        yield Diagnostic("F2012", f"{net.name!r} is not a name for a net", hint, ("cell",))
     yield from _duplicate_names(net)
     controllers = {controller.name for controller in net.controllers}
     yield from _ownership(net, controllers)
@@ -75,12 +83,7 @@ def _duplicate_names(net: Net) -> Iterator[Diagnostic]:
     for kind, names in kinds:
         seen: set[str] = set()
         for name in names:
-            if (
-                not name
-                or not FORBIDDEN_IN_NAMES.isdisjoint(name)
-                or not name.isprintable()
-                or name in {"and", "or", "not", "->"}
-            ):
+            if not is_name(name) or name in {"and", "or", "not", "->"}:
                 singular = {"properties": "property"}.get(kind, kind[:-1])
                 yield Diagnostic(
                     "F2012",
@@ -231,7 +234,7 @@ def _meanings(net: Net) -> Iterator[Diagnostic]:
         if place.resource is None:
             continue
         idle = place.resource.idle
-        if not idle.partition(".")[2] or not FORBIDDEN_IN_NAMES.isdisjoint(idle) or not idle.isprintable():
+        if not idle.partition(".")[2] or not is_name(idle):
             yield Diagnostic(
                 "F2012",
                 f"{idle!r} is not the full name of a place",

@@ -23,7 +23,7 @@ from firable.nets.tasks import document as doc
 from firable.nets.tasks.model import Catalogue, Gate, Move, Role, Step, Subtask, Task
 from firable.nets.text_positions import bounded
 from firable.nets.time_limits import no_time, parse_time
-from firable.nets.well_formed import FORBIDDEN_IN_NAMES
+from firable.nets.well_formed import is_name
 from firable.nets.yaml_tree import Node, Scalar, Sequence, data, node_span, nodes_along, parse_tree
 
 SIZE_BYTES_MAX: Final = 1024 * 1024
@@ -165,13 +165,13 @@ class _Reading:
             *((f"roles/{role}/steps", of.steps or {}, RESERVED_STEPS) for role, of in self.roles.items()),
             *((f"roles/{role}/inputs", of.inputs or {}, ()) for role, of in self.roles.items()),
         )
-        if not _is_name(self.name):
+        if not is_name(self.name):
             self.problem("F2012", f"{self.name!r} is not a name for a task", _NAME_HINT, self.path)
         words: dict[str, str] = {}
         for table, names, taken in tables:
             for name in names:
                 path = (*self.path, *table.split("/"), name)
-                if not _is_name(name) or "." in name:
+                if not is_name(name) or "." in name:
                     self.problem("F2012", f"{name!r} is not a name here", _NAME_HINT, path)
                 elif name in taken:
                     self.problem("F2012", f"'{name}' has a meaning of its own here", "take another name", path)
@@ -355,7 +355,3 @@ _KNOWN_HINT: Final = {
 
 def _shown(node: Node) -> bool:
     return not isinstance(node, Scalar) or bool(node.text)
-
-
-def _is_name(name: str) -> bool:
-    return bool(name) and FORBIDDEN_IN_NAMES.isdisjoint(name) and name.isprintable()

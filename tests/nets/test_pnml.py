@@ -185,6 +185,7 @@ def test_other_encodings_and_prefixes_are_read() -> None:
 
 def test_the_name_of_the_net_is_its_name_or_identifier_or_file() -> None:
     assert parse_pnml("<pnml><net id='a'><name><text>b</text></name></net></pnml>").net.name == "b"
+    assert parse_pnml("<pnml><net id='a'><name><text>b\n  c\u200b</text></name></net></pnml>").net.name == "b c·"
     assert parse_pnml("<pnml><net id='a'/></pnml>").net.name == "a"
     assert parse_pnml("<pnml><net/></pnml>", "dir/c.pnml").net.name == "c"
 

@@ -181,6 +181,7 @@ def test_what_is_not_understood_is_refused(formula: str, code: str) -> None:
         ("<pnml/>", ["F1018"]),
         ("<property-set><formula/></property-set>", ["F1018"]),
         ("<property-set><property><id>x</id></property></property-set>", ["F1018"]),
+        (f"<property-set>{xml('<true/>', 'x  shown')}</property-set>", ["F1018"]),
         (f"<property-set>{xml('<true/>')}\n{xml('<true/>')}</property-set>", ["F2001"]),
         ("<!DOCTYPE a [<!ENTITY b 'c'>]><property-set/>", ["F1018"]),
         ('<?xml version="1.0" encoding="nonsense"?><property-set/>', ["F1018"]),

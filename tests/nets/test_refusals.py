@@ -167,6 +167,7 @@ TABLE = (
     net("transition with the name of a place", "places: {p: }\ntransitions: {p: }\n", "F2001 4:15",
         "rename one of them"),
     net("signal twice", "inputs: [a, a]\n", "F2001 3:13", "rename one of them"),
+    of("net of two lines", 'firable: 1\ncell: "c\\n  shown"\n', "F2012 2:7", "write it on one line"),
     net("not a name", "places: {'a b': }\n", "F2012 3:10", "use letters, digits"),
     net("opens to no place", ROBOT + "places: {r: {opens: {to: robot, machine: R}}}\n", "F2012 10:26", "write `to:"),
     net("opened twice", ROBOT + "places:\n  r: {opens: {to: robot.a, machine: R}}\n"

@@ -124,7 +124,7 @@ def whole_nets(draw: st.DrawFn) -> Net:
             some_of = {Logic.CTL: ctl_formulas, Logic.LTL: ltl_formulas}[logic]
             properties.append(TemporalProperty(f"l{i}", logic, draw(some_of(list(places), names))))
     net = Net(
-        draw(_TEXTS),
+        draw(_TEXTS.filter(str.isprintable)),
         tuple(places.values()),
         tuple(transitions),
         tuple(signals.values()),
