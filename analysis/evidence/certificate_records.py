@@ -43,6 +43,8 @@ from firable.nets.net import Net
 
 DEPTH_MAX: Final = 1_000
 ROUNDS_MAX: Final = 1_000_000
+_DIGITS_MAX: Final = 4_000  # of one number: Python prints up to 4,300 digits, and sums of these are printed, too
+_NUMBER_MAX: Final = 10**_DIGITS_MAX
 
 Firings = list[list[str]]
 
@@ -76,6 +78,8 @@ class _InvariantRecord(Data):
 
     def of(self, net: Net, _: Sequence[Markings | Diagram]) -> InductiveInvariant:
         def weights(one: _SumRecord) -> tuple[tuple[str, int], ...]:
+            if any(abs(number) >= _NUMBER_MAX for number in (one.tokens, *one.weights.values())):
+                raise ValueError(f"a number of an invariant has more than {_DIGITS_MAX:,} digits")
             return tuple((known(name, net.place_index), weight) for name, weight in one.weights.items())
 
         return InductiveInvariant(

@@ -47,8 +47,9 @@ from firable.nets.diagnostics import Diagnostic, InputError, Span
 from firable.nets.formula import FormulaError
 from firable.nets.interchange import canonical_json, net_digest, net_from_json, net_to_json
 from firable.nets.net import Net
-from firable.nets.queries import parse_query
-from firable.nets.source import printable, read_bytes
+from firable.nets.queries import KnownNames, parse_query
+from firable.nets.source import printable, quoted, read_bytes
+from firable.nets.well_formed import is_name
 from firable.semantics.trace import Discipline
 
 VERSION: Final = 2
@@ -243,11 +244,17 @@ def _document(record: EvidenceRecord) -> Document:
         raise ValueError("a verdict stands twice")
     sets, before = [one.space(net) for one in record.sets], _Before()
     records = []
+    names_of_net = KnownNames(net)
     for verdict in record.verdicts:
+        if verdict.name and not is_name(verdict.name):
+            raise ValueError(f"{quoted(verdict.name)} is not the name of a verdict")
+        if not verdict.query.isprintable() or not verdict.lacking.isprintable():
+            raise ValueError(f"what is said of '{verdict.name}' is not one line in visible characters")
         if verdict.query:
             if not verdict.name.startswith("query."):
                 raise ValueError(f"'{verdict.name}' is no query, and comes with the text of one")
-            parse_query(verdict.query)
+            for _, message, _ in names_of_net.problems(parse_query(verdict.query)):
+                raise ValueError(message)
         shown = []
         for one in verdict.shown:
             claim, of = one.claim.of(net), one.certificate
