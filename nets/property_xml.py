@@ -3,18 +3,23 @@
 The contest (https://mcc.lip6.fr) asks its questions in one XML dialect: reachability, CTL and LTL over cardinality
 (`integer-le` of `tokens-count`) and fireability (`is-fireable`), `place-bound` for upper bounds, `deadlock`; tools add
 elements for liveness, quasi-liveness, stable marking and safeness. All of it is read as it is. The quantifier around an
-LTL formula is implied here and taken off; what is in both logics is CTL.
+LTL formula is implied here and taken off; what is in both logics is CTL, which says the same of every net but for
+`next`: in a deadlock `AX p` holds, and `X p` iff p does. The contest asks for each logic in a file of its own: the
+category in the <id>, or else in the name of the file, tells which is meant, and else the other properties of the file,
+where those that can be of one logic only are of LTL. `next` that is told by nothing is that of CTL.
 
 What is not known is refused, never skipped: a formula of which a part is left out is another formula.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Final
 
 from firable.nets.diagnostics import Diagnostic, InputError
-from firable.nets.formula import Compare, Constant, Count, Deadlock, Firable, FormulaError, Or, Sign
+from firable.nets.formula import Compare, Constant, Count, Deadlock, Firable, Formula, FormulaError, Or, Sign
 from firable.nets.net import Net
 from firable.nets.queries import PROBLEMS_MAX, KnownNames, Query, QueryKind
 from firable.nets.source import Source, quoted
@@ -31,6 +36,7 @@ from firable.nets.temporal import (
     any_of,
     logics,
     negated,
+    operands_of,
 )
 from firable.nets.text_positions import bounded
 from firable.nets.well_formed import is_name
@@ -54,6 +60,7 @@ _WHOLE: Final = {
     "quasi-liveness": QueryKind.QUASI_LIVE,
     "stable-marking": QueryKind.STABLE_MARKING,
 }
+_CATEGORY: Final = re.compile("(CTL|LTL)(?:Cardinality|Fireability)")
 _HINT: Final = "the property XML of the model checking contest is read, with nothing else in it"
 
 
@@ -68,7 +75,7 @@ def parse_property_xml(data: bytes, net: Net, renamed: Mapping[str, str], file: 
     queries = tuple(reading.queries(parse_elements(source, data, "F1018")))
     if reading.problems:
         raise InputError(bounded(reading.problems))
-    return queries
+    return tuple(_in_its_logic(queries, Path(file).name))
 
 
 class _Reading:
@@ -220,6 +227,29 @@ class _Reading:
             span = self.source.span(element.line, element.column, len(element.tag) + 2)
             self.report(Diagnostic(code, message, hint, span=span))
         return name
+
+
+def _in_its_logic(queries: Sequence[Query], file: str) -> Iterator[Query]:
+    """The queries, with `next` over a state formula in the logic of its file."""
+    told = {query.kind for query in queries if _is_of_one_logic(query)}
+    for query in queries:
+        match query.formula:
+            case ForAll(Next(operand) as path) if isinstance(operand, Formula):
+                named = _CATEGORY.findall(query.name) or _CATEGORY.findall(file)
+                is_ltl = named[-1] == "LTL" if named else told == {QueryKind.LTL}
+                yield Query(query.name, QueryKind.LTL, path) if is_ltl else query
+            case _:
+                yield query
+
+
+def _is_of_one_logic(query: Query) -> bool:
+    """Whether a formula, as the XML has it, can be meant in one of the two logics only."""
+    match query.formula:
+        case ForAll(path):
+            return not all(isinstance(operand, Formula) for operand in operands_of(path))
+        case None:
+            return False
+    return not isinstance(query.formula, Formula)
 
 
 def _is_ctl(formula: Temporal) -> bool:

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from firable.analysis.check import check
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import FormulaError
 from firable.nets.net import Net, Place, Transition
@@ -140,6 +141,41 @@ COUNT = f"<tokens-count>{P}{Q}</tokens-count>"
 )  # fmt: skip
 def test_the_elements_of_the_property_xml_are_read(formula: str, text: str) -> None:
     assert format_query(of_xml(xml(formula))[0]) == text
+
+
+NEXT = f"<all-paths><next>{T}</next></all-paths>"
+STATE = f"<all-paths><finally>{T}</finally></all-paths>"
+ONLY_LTL = f"<all-paths><globally><finally>{T}</finally></globally></all-paths>"
+ONLY_CTL = f"<all-paths><globally>{EF}{T}{END}</globally></all-paths>"
+
+
+@pytest.mark.parametrize(
+    ("name", "file", "others", "text"),
+    [
+        ("x", "q.xml", [], f"ctl AX {F}"),
+        ("x", "q.xml", [STATE], f"ctl AX {F}"),
+        ("x", "q.xml", [STATE, ONLY_LTL], f"ltl X {F}"),
+        ("x", "q.xml", [ONLY_CTL, ONLY_LTL], f"ctl AX {F}"),
+        ("x", "LTLFireability.xml", [ONLY_CTL], f"ltl X {F}"),
+        ("x", "CTLFireability.xml", [ONLY_LTL], f"ctl AX {F}"),
+        ("N-PT-1-LTLCardinality-00", "CTLFireability.xml", [ONLY_CTL], f"ltl X {F}"),
+        ("N-PT-1-CTLFireability-2024-15", "LTLFireability.xml", [ONLY_LTL], f"ctl AX {F}"),
+    ],
+)
+def test_next_is_of_the_logic_of_its_file(name: str, file: str, others: list[str], text: str) -> None:
+    properties = [xml(formula, f"y{i}") for i, formula in enumerate(others)]
+    data = f"<property-set>{''.join(properties)}{xml(NEXT, name)}</property-set>".encode()
+    *rest, query = parse_property_xml(data, NET, {}, f"some/LTLCardinality/{file}")
+    assert format_query(query) == text
+    assert all(format_query(other) == f"ctl AF {F}" for other, of in zip(rest, others, strict=True) if of == STATE)
+
+
+def test_next_of_a_deadlock_is_what_the_logic_of_the_file_says() -> None:
+    stuck = Net("stuck", (Place("p"),), (Transition("t", ("p",)),))
+    for name, holds in (("N-LTLFireability-0", False), ("N-CTLFireability-0", True)):
+        data = f"<property-set>{xml(NEXT, name)}</property-set>".encode()
+        queries = parse_property_xml(data, stuck, {})
+        assert check(stuck, queries=queries).verdict(f"query.{name}").holds is holds
 
 
 def test_an_exclusive_disjunction_is_one() -> None:
