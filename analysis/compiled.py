@@ -163,8 +163,12 @@ class Nodes:
                     of, values = values[first:], values[:first]
                     values.append(self.conjunction(of) if isinstance(part, And) else self.disjunction(of))
                 case _:
-                    values.append(evaluate(self, net, part, self.holds))
+                    values.append(self.atom(net, part))
         return values.pop()
+
+    def atom(self, net: Net, part: Formula) -> Pair:
+        """The value of a formula that is no NOT, AND or OR."""
+        return evaluate(self, net, part, self.holds)
 
     def needed_for(self, root: int) -> list[Node]:
         """The nodes that a node is made of, operands first and itself last, numbered anew."""

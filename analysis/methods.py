@@ -45,6 +45,7 @@ class Method(StrEnum):
     STUBBORN_SETS = "stubborn-sets"
     COMPACT = "compact"
     WALK = "walk"
+    PARIKH = "parikh"
     ON_THE_FLY = "on-the-fly"
 
 
@@ -98,6 +99,7 @@ GOALS: Final[dict[Method, Technique[GoalDecider]]] = {
     Method.STATE_EQUATION: Technique(
         "state equation", "firable.analysis.structure.state_equation:decide_by_state_equation"
     ),
+    Method.PARIKH: Technique("Parikh vectors", "firable.analysis.structure.parikh:decide_by_parikh"),
     Method.BOUNDED: Technique("bounded model checking", "firable.analysis.induction.bounded:decide_by_bounded_search"),
     Method.K_INDUCTION: Technique("k-induction", "firable.analysis.induction.k_induction:decide_by_k_induction"),
     Method.PDR: Technique("property-directed reachability", "firable.analysis.induction.pdr:decide_by_pdr"),
@@ -114,7 +116,7 @@ FORMULAS: Final[dict[Logic, dict[Method, Technique[FormulaDecider]]]] = {
 }
 
 GOAL_LANES: Final[tuple[tuple[Method, ...], ...]] = (
-    (Method.REDUCTION, Method.WALK, Method.STUBBORN_SETS, Method.BOUNDED),
+    (Method.REDUCTION, Method.PARIKH, Method.WALK, Method.STUBBORN_SETS, Method.BOUNDED),
     (Method.STATE_EQUATION, Method.K_INDUCTION, Method.PDR, Method.COMPACT),
 )
 """How `auto` races them: what finds violations beside what proves; each lane in turns that grow."""

@@ -28,7 +28,8 @@ from firable.cli.text import show_errors
 
 EXTRAS = {
     **dict.fromkeys(
-        ("z3", "networkx", "numpy", "platformdirs", "junitparser"), ("prove", "all that checking and proving need")
+        ("z3", "networkx", "numpy", "highspy", "platformdirs", "junitparser"),
+        ("prove", "all that checking and proving need"),
     ),
     "mtkahypar": ("split", "what looks for owners of large nets"),
     **dict.fromkeys(

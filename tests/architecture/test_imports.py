@@ -21,7 +21,7 @@ MAY_IMPORT = {
     "executor": {"semantics", "nets"},
     "cli": {"executor", "decompose", "analysis", "semantics", "nets"},
 }
-PROVERS = {"z3", "networkx", "numpy", "cvc5"}
+PROVERS = {"z3", "networkx", "numpy", "highspy", "cvc5"}
 THIN = {"nets", "semantics", "executor"}
 
 

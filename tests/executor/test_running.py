@@ -145,7 +145,7 @@ import sys
 from firable.executor import load, read_plant, run
 plant = read_plant({str(catalogue_path("one_robot").with_name("one_robot.plant.yaml"))!r})
 assert run(load({str(tmp_path / "cell.bundle")!r}), plant, workpieces=2).delivered == (1, 2)
-heavy = {{"z3", "networkx", "numpy", "firable.analysis", "firable.decompose", "firable.cli"}}
+heavy = {{"z3", "networkx", "numpy", "highspy", "firable.analysis", "firable.decompose", "firable.cli"}}
 print(sorted(heavy & set(sys.modules)))
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
