@@ -14,7 +14,7 @@ from firable.executor.drivers.binding import Binding, CommandDocument
 from firable.executor.drivers.bound_device import LOOK_SECONDS, BoundDevice
 from firable.executor.drivers.cancelling import ended, uninterrupted
 from firable.executor.drivers.completions import Completions
-from firable.executor.drivers.driver import Answer, Clock, Listener, Reading
+from firable.executor.drivers.driver import Answer, Cautious, Clock, Listener, Reading
 from firable.executor.drivers.fitting import misfits
 from firable.executor.drivers.sharing import masters, shared
 from firable.nets.diagnostics import InputError
@@ -63,6 +63,8 @@ class BoundDriver:
         self.contacts = [device.contacts for device in self.devices.values()]
         self.clock: Clock | None = None
         self.listener: Listener | None = None
+        self.has_begun = False
+        """Whether it may have done something to its devices."""
         self.is_stopped = False
         self.is_latched = latched
         """Whether there was an emergency stop, and nobody has reset it."""
@@ -89,8 +91,8 @@ class BoundDriver:
 
     @property
     def unconfirmed(self) -> tuple[str, ...]:
-        """The devices that have safe outputs and have not confirmed them since the stop."""
-        return tuple(name for name, device in self.devices.items() if not device.kept.is_safe)
+        """The devices that have safe outputs and have not confirmed them since the stop; none of those left alone."""
+        return tuple(name for name, one in self.devices.items() if self.has_begun and not one.kept.is_safe)
 
     @property
     def undriven(self) -> tuple[str, ...]:
@@ -112,6 +114,9 @@ class BoundDriver:
         self.clock, self.listener = clock, listener
         for name in self.devices:
             self.binding.kinds[name].load()
+        if isinstance(listener, Cautious):
+            await listener.let_drive()
+        self.has_begun = True
         tasks = [asyncio.create_task(device.run(), name=name) for name, device in self.devices.items()]
         try:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_EXCEPTION)
@@ -196,7 +201,7 @@ class BoundDriver:
         """Drive the safe outputs of every device that can be reached; the others have their watchdogs."""
         if not self.is_stopped:
             self.is_stopped = True
-            left = [device for device in self.devices.values() if device.is_out_of_reach]
+            left = [device for device in self.devices.values() if self.has_begun and device.is_out_of_reach]
             for device in self.devices.values():
                 device.kept.stop()
             for device in left:  # only now: who is told may fail, or take its time

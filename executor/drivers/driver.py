@@ -26,7 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from enum import StrEnum
-from typing import Protocol, TypeVar
+from typing import Protocol, TypeVar, runtime_checkable
 
 from firable.executor.protocol.commands import Answer as Answer
 from firable.executor.protocol.messages import Effect, Sending
@@ -161,6 +161,15 @@ class Driver(Protocol):
 
     def close(self) -> bool:
         """Let no new work into the cell, as far as the driver can; whether none comes any more."""
+        ...
+
+
+@runtime_checkable
+class Cautious(Protocol):
+    """A listener that may have to leave the machines alone for a while, for another host may have them."""
+
+    async def let_drive(self) -> None:
+        """Wait until they may be driven."""
         ...
 
 

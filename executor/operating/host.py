@@ -314,7 +314,11 @@ class Host:
         self.operated = False
         self.groups.wake()
 
-    # What the driver tells
+    # What the driver tells, and asks
+
+    async def let_drive(self) -> None:
+        """Wait until the machines may be driven: no other host has them, as far as is known, or it is an emergency."""
+        await self.peers.let_drive(lambda: self.emergency is not None)
 
     def signal(self, name: str, value: bool, entry: int | None) -> None:
         """A signal has a new value."""

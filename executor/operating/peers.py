@@ -17,6 +17,13 @@ that was mistyped or left out looks like the first start of a cell, and only the
 that, or before anybody was met since this host was started, it ends: its places of the start are wrong. If they have
 heard later things of this very journal, it ends whoever was met: its places are old, and nobody but it knows of others.
 
+*Machines that another host runs*: a host that is started by mistake beside the one that has its machines would stop
+them by the safe outputs of its start, in the middle of their work. So one that nobody has ever let in leaves them alone
+until somebody does or `MEET_SECONDS` are over, and as long as another host has them. One that comes back with its
+journal drives the safe outputs at once, and so does an emergency stop.
+Rejected: to leave them alone until somebody lets it in, however long. A cell is started from its machines at rest, and
+the first host of it may wait for hours for the others.
+
 *Another bundle or version*: of two such hosts neither can know which is wrong, and neither will be let in by the other.
 One that nobody has ever let in ends when all coordinators of its machines refuse it so, and none that fits has come
 `MEET_SECONDS` later: it can do nothing without them (F5020). One that was let in before is right, and goes on. The host
@@ -77,7 +84,7 @@ class Peers:
         self.link = link
         self.told = told
         self.repeat_seconds = self.pause_seconds = repeat_seconds
-        here = {*acts.coordinators, *acts.controllers}
+        self.here = here = {*acts.coordinators, *acts.controllers}
         self.names = {*coordinators(decomposition), *(subnet.name for subnet in decomposition.subnets)} - here
         self.deciding = {above for controller in acts.controllers.values() for above in controller.above} - here
         """The coordinators elsewhere of machines here."""
@@ -94,6 +101,8 @@ class Peers:
         self.meeting = asyncio.Event()
         self.turned_away: dict[str, str] = {}
         """What is said of each that was refused and has not come back as it should."""
+        self.claimed: set[str] = set()
+        """The machines here that another host has, as somebody has said."""
         self.unlike: set[str] = set()
         """Those that were met with another bundle or version, and not with this one since."""
         self.hopeless: asyncio.TimerHandle | None = None
@@ -131,6 +140,23 @@ class Peers:
         while self.nobody_met:
             self.meeting.clear()
             await self.meeting.wait()
+
+    async def let_drive(self, is_urgent: Callable[[], bool]) -> None:
+        """Wait as long as another host may have the machines here, or has them, unless it becomes urgent."""
+        loop = asyncio.get_running_loop()
+        until = loop.time() + MEET_SECONDS
+        while self.is_unmet and not is_urgent() and (self.claimed or loop.time() < until):
+            self.meeting.clear()
+            try:
+                async with asyncio.timeout_at(None if self.claimed else until):
+                    await self.meeting.wait()
+            except TimeoutError:
+                continue
+            except asyncio.CancelledError:
+                own = asyncio.current_task()
+                if own is None or not is_urgent():
+                    raise
+                own.cancel()  # of who drives by then, and on its way out drives the safe outputs
 
     async def run(self) -> None:
         """Be linked to them until cancelled; raises `InputError` where the link cannot be opened, or fails."""
@@ -272,6 +298,8 @@ class Peers:
     def refused(self, peers: Sequence[str], why: Refusal) -> None:
         """A host was refused."""
         self._turn_away(peers, f"the host of {all_called(peers)} is refused: {why.problem.message}; {why.problem.hint}")
+        self.claimed.update(self.here.intersection(peers))
+        self.meeting.set()
         if why.are_unlike:
             self.unlike.update(peers)
             if self._is_hopeless and self.hopeless is None:

@@ -1,0 +1,150 @@
+"""A host that is started beside the one that has its machines leaves them alone: they would stop in their work."""
+
+import asyncio
+from importlib.metadata import EntryPoint
+
+import pytest
+from support.third_party_driver import MemoryEnd
+from support.two_hosts import SPLIT, Hosts, refusal
+
+from firable.executor.drivers import kinds
+from firable.executor.drivers.bench import until
+from firable.executor.drivers.binding import parse_binding
+from firable.executor.drivers.bound import BoundDriver, bound_driver
+from firable.executor.journal.journal import Journal, MemoryJournal
+from firable.executor.links.link import COORDINATOR, run_by_two
+from firable.executor.operating import peers
+from firable.executor.operating.host import Host
+from firable.executor.operating.situation import Situation
+
+A, CENTRE = ("a",), ("b", COORDINATOR)
+BINDING = """
+firable_bind: 1
+cell: cell
+devices: {box: {driver: theirs, memory: box, safe: {out: false}, channels: {A: {number: n, taken: t}}}}
+commands: {a.lamp: {device: box, channel: A}}
+"""
+
+
+class Cell:
+    """The hosts of a cell, that of a with a device, and what the device is written."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        entry = EntryPoint("theirs", "support.third_party_driver:KIND", kinds.GROUP)
+        monkeypatch.setattr(kinds, "entry_points", lambda **_: [entry])
+        self.hosts, self.written = Hosts(), list[str]()
+        self.end = MemoryEnd("box")
+        self.tasks: list[asyncio.Task[Situation]] = []
+
+    async def begin(self) -> None:
+        await self.end.start(self._written)
+        self.end.show("t", value=0)
+
+    def _written(self, point: str, value: object) -> None:
+        self.written.append(point)
+        if point == "n":
+            self.end.show("t", value=value)  # type: ignore[arg-type]
+
+    def start(self, machines: tuple[str, ...], journal: Journal | None = None) -> Host:
+        host = self.hosts.host(machines, journal or MemoryJournal())
+        if machines == A:
+            host.driver = bound_driver(parse_binding(BINDING), SPLIT.net, SPLIT.subnet("a"))
+        self.tasks.append(asyncio.create_task(host.main()))
+        return host
+
+    async def end_all(self) -> None:
+        for task in self.tasks:
+            task.cancel()
+        await asyncio.gather(*self.tasks, return_exceptions=True)
+
+
+def test_a_host_beside_the_one_that_has_its_machines_writes_them_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(peers, "MEET_SECONDS", 0.3)
+
+    async def main() -> None:
+        cell = Cell(monkeypatch)
+        await cell.begin()
+        for machines in (CENTRE, A):
+            cell.start(machines)
+        await until(lambda: "n" in cell.written, "the command of the host that has the machine")
+        cell.written.clear()
+        mistaken = cell.start(A)
+        assert (await refusal(cell.tasks[-1])).code == "F5025"  # the coordinator knows another journal
+        assert mistaken.peers.claimed == {"a"}
+        assert cell.written == []
+        await cell.end_all()
+
+
+def test_a_host_whose_machines_another_one_has_leaves_them_alone_until_it_is_stopped(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(peers, "MEET_SECONDS", 0.1)
+
+    async def main() -> None:
+        cell = Cell(monkeypatch)
+        await cell.begin()
+        mistaken = cell.start(A)
+        await asyncio.sleep(0)
+        mistaken.peers.refused(A, run_by_two(A))
+        await asyncio.sleep(0.4)
+        driver = mistaken.driver
+        assert isinstance(driver, BoundDriver)
+        assert not driver.has_begun
+        mistaken.stop()
+        ended = await cell.tasks[-1]
+        assert cell.written == []
+        assert "not confirmed" not in str(ended)
+
+    asyncio.run(main())
+
+
+def test_a_host_that_hears_of_nobody_drives_the_safe_outputs_after_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(peers, "MEET_SECONDS", 0.2)
+
+    async def main() -> None:
+        cell = Cell(monkeypatch)
+        await cell.begin()
+        alone = cell.start(A)
+        await asyncio.sleep(0)
+        assert cell.written == []
+        await until(lambda: cell.written == ["out"], "the safe outputs")
+        assert alone.peers.is_unmet
+        await cell.end_all()
+
+    asyncio.run(main())
+
+
+def test_a_host_that_was_let_in_before_drives_them_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(peers, "MEET_SECONDS", 600.0)
+
+    async def main() -> None:
+        cell, journal = Cell(monkeypatch), MemoryJournal()
+        await cell.begin()
+        cell.start(CENTRE)
+        cell.start(A, journal)
+        await until(lambda: "n" in cell.written, "the command: it was let in")
+        await cell.end_all()
+        cell.tasks.clear()
+        cell.written.clear()
+        again = cell.start(A, journal)
+        await until(lambda: cell.written[:1] == ["out"], "the safe outputs")
+        assert again.peers.nobody_met
+        await cell.end_all()
+
+    asyncio.run(main())
+
+
+def test_an_emergency_stop_is_driven_by_a_host_that_nobody_has_let_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(peers, "MEET_SECONDS", 600.0)
+
+    async def main() -> None:
+        cell = Cell(monkeypatch)
+        await cell.begin()
+        host = cell.start(A)
+        await asyncio.sleep(0.05)
+        assert cell.written == []
+        host.emergency_stop("a person")
+        await cell.tasks[0]
+        assert cell.written == ["out"]
+
+    asyncio.run(main())
