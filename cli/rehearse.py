@@ -15,7 +15,7 @@ import click
 
 from firable.cli import text
 from firable.cli.files import READ
-from firable.cli.options import answer, format_option, load_net
+from firable.cli.options import answer, format_option, is_given, load_net
 from firable.cli.report import Report
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from firable.executor.simulation.judge import Subject
     from firable.nets.verdict import Verdict
 
+_OF = {"--seeds": "seeds", "--from": "first", "--jobs": "jobs"}
 _CHUNK = 50
 _SEEDS_PER_NET = 10
 _FAILURES_MAX = 5
@@ -73,6 +74,8 @@ def rehearse(
     """
     from firable.executor.simulation.campaign import Run
 
+    if seed is not None and (more := [name for name in ("--seeds", "--from", "--jobs") if is_given(_OF[name])]):
+        raise click.UsageError(f"--seed is one run alone, and {more[0]} is for many")
     kinds = _kinds(faults)
     asked = [seed] if seed is not None else range(first, first + seeds)
     runs = [Run(each, kinds, steps) for each in asked]

@@ -4,7 +4,9 @@ Each firing must be firable, in a trace that records signals with its external g
 an output signal must send its command exactly once before the token leaves; and the last line must show the marking
 reached. A token that enters a place clears the completion signal of the place and its timer: a value from before is
 stale and opens no gate, a completion may not come before its command, and a timer is set only while the token is there
-and its completion has not come. A trace without its last line replays as incomplete. One that begins in the middle,
+and its completion has not come. Where a time limit has let the token go, the command is still under way, and its
+completion may come at any time: also between the next entry, which a trace shows where it is decided, and the command
+of that, which clears it once more. A trace without its last line replays as incomplete. One that begins in the middle,
 because its run has taken a cell over, is judged from the marking that its first line names.
 
 One judge for counterexamples of the analysis and logs of the executor, and the slow one on purpose: it shares no
@@ -69,6 +71,8 @@ class Replayer:
         self.marking = net.initial_marking
         self.signals: dict[str, bool] = {}
         self.owed: set[str] = set()
+        self.under_way: set[str] = set()
+        """The completions of commands that were sent and have not come."""
         self.timed = {place.within.timer: place for place in net.places if place.within is not None}
         self.now_seconds = 0.0
         self.firings = 0
@@ -126,13 +130,15 @@ class Replayer:
         if event.signal not in self.net.signal_index:
             self._deviates(event, f"there is no signal '{event.signal}'", "is the trace of another net?")
         unsent = [place for place in sorted(self.owed) if self.net.place(place).completion == event.signal]
-        if event.value and unsent:
+        if event.value and unsent and event.signal not in self.under_way:
             self._deviates(
                 event, f"'{event.signal}' completes a command of '{unsent[0]}' that was not sent", "it is stale"
             )
         if event.value and (place := self.timed.get(event.signal)) is not None:
             self._timed_out(event, place)
         self.signals[event.signal] = event.value
+        if event.value:
+            self.under_way.discard(event.signal)
 
     def _timed_out(self, event: SignalChanged, place: Place) -> None:
         """When a timer may be set; not after what time, since a controller has a clock of its own."""
@@ -214,6 +220,9 @@ class Replayer:
             self._deviates(event, f"a command of '{event.place}' that is not due", reason)
         self.owed.remove(event.place)
         self.commands += 1
+        if (completion := self.net.place(event.place).completion) is not None:
+            self.signals[completion] = False
+            self.under_way.add(completion)
 
     def _ended(self, end: End) -> None:
         shown = self.net.names(self.marking)

@@ -160,3 +160,11 @@ def test_every_kind_of_fault_is_in_the_help(capsys: pytest.CaptureFixture[str]) 
     assert main(["rehearse", "--help"]) == 0
     words = told(capsys).replace("\n", " ").replace(",", " ").replace(".", " ").split()
     assert not [kind for kind in KINDS if kind not in words]
+
+
+@pytest.mark.parametrize("more", [("--seeds", "3"), ("--from", "0"), ("--jobs", "2")])
+def test_one_run_alone_takes_nothing_that_is_for_many(
+    more: tuple[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["rehearse", "catalogue:one_robot", "--seed", "1", *more]) == 2
+    assert f"--seed is one run alone, and {more[0]} is for many" in capsys.readouterr().err

@@ -68,3 +68,21 @@ def test_a_timer_that_cannot_be_is_no_event_of_the_net(events: list[Event], says
 
 def test_a_timer_may_be_told_to_be_cleared_at_any_time() -> None:
     assert played(signal("go_overdue", value=False), fired("start"), SENT).firings == 1
+
+
+AGAIN = [fired("start"), SENT, LATE, fired("go_timeout"), fired("again")]
+"""The token was let go while the machine was at its command, and comes again; its new command is still to be sent."""
+
+
+def test_the_completion_of_a_command_whose_time_was_over_may_come_before_the_next_one_and_opens_nothing() -> None:
+    assert played(*AGAIN, signal("there"), SENT, end=("go",)).commands == 2
+    with pytest.raises(InputError, match="'there' is 0 and must be 1"):
+        played(*AGAIN, signal("there"), SENT, fired("end"))
+    assert played(*AGAIN, signal("there"), SENT, signal("there"), fired("end"), end=("free",)).firings == 4
+
+
+def test_one_completion_is_not_that_of_two_commands_before_the_next_is_sent() -> None:
+    with pytest.raises(InputError, match="completes a command of 'go' that was not sent"):
+        played(*AGAIN[:4], signal("there"), fired("again"), signal("there"))
+    with pytest.raises(InputError, match="completes a command of 'go' that was not sent"):
+        played(fired("start"), signal("there"))
