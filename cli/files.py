@@ -13,6 +13,7 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -153,21 +154,27 @@ class _Named:
     def files(self) -> tuple[str, ...]:
         return tuple(self.type.files(self.argument))
 
+    @cached_property
+    def identities(self) -> frozenset[str | tuple[int, int]]:
+        """By what each of the files is known."""
+        return frozenset(identity for file in self.files for identity in _identities(file))
+
 
 def _compare(by: str, files: Iterable[str], other: _Named, hint: str = "name another file") -> None:
     from firable.nets.diagnostics import Diagnostic, InputError
     from firable.nets.source import printable
 
     for file in files:
-        if any(_is_same(file, one) for one in other.files):
+        if not other.identities.isdisjoint(_identities(file)):
             another = "another " if other.by == by else ""
             whom = f"{another}{other.by} writes" if other.is_written else "the command reads"
             message = f"{printable(file)}: {by} would overwrite what {whom}"
             raise InputError([Diagnostic("F1017", message, hint)])
 
 
-def _is_same(one: str, other: str) -> bool:
-    try:
-        return os.path.realpath(one) == os.path.realpath(other) or Path(one).samefile(other)
-    except (OSError, ValueError):  # no such file yet, or a name that no file can have, as is told of then
-        return False
+def _identities(file: str) -> Iterator[str | tuple[int, int]]:
+    """By what a file is known, over links of both kinds: where its name leads, and its place on the disk."""
+    with suppress(OSError, ValueError):  # a name that no file can have, as is told of then
+        yield os.path.realpath(file)
+        status = Path(file).stat()
+        yield status.st_dev, status.st_ino

@@ -165,6 +165,10 @@ class Kept:
         """What ended the serving, and was no failure of a link."""
         self.writing: asyncio.Timeout | None = None
         """Around a command that is being written: a stop breaks it off."""
+        self.beating: asyncio.Timeout | None = None
+        """Around a heartbeat that is being written."""
+        self.has_read = False
+        """Whether the device has shown on this connection what it shows."""
         self.late_seconds = -inf
         """Until when a command may come to the device that was sent and never confirmed."""
         self.stopped = asyncio.Event()
@@ -233,6 +237,8 @@ class Kept:
         if self.writing is not None and not self.writing.expired():
             patience_s = 0.0 if self.withholding is None else _CONFIRMED_SECONDS
             self.writing.reschedule(asyncio.get_running_loop().time() + patience_s)
+        if self.beating is not None and not self.beating.expired():
+            self.beating.reschedule(asyncio.get_running_loop().time() + self.document.timeout_s / 2)
         if self.withholding is not None and (self.writing is not None or self.begun is not None):
             self.withholding.withhold()
         self.awake.set()
@@ -269,23 +275,14 @@ class Kept:
             await connection.close()
 
     async def _serve(self, connection: Connection) -> None:
-        if self.stopping:  # nothing that it shows decides what is written, and the safe outputs do not wait for it
-            await self._first_of(self._write(connection), self._read(connection))
-        else:
-            self._take(await self._first_read(connection))
-            await self._first_of(self._read(connection), self._write(connection))
+        self.has_read = False
+        await self._first_of(self._write(connection), self._read(connection))
 
-    async def _first_read(self, connection: Connection) -> Sequence[tuple[Point, Value]]:
-        """What the device shows; after an emergency stop behind the safe outputs, for it may take its time."""
-        if not (self.safe and self.served.is_latched):
-            return await connection.read()
-        tasks = asyncio.create_task(connection.write(self.safe)), asyncio.create_task(connection.read())
-        try:
-            await tasks[0]
-            self.started = True
-            return await tasks[1]
-        finally:
-            await ended(tasks)
+    async def _until_read(self) -> None:
+        """Wait until the device has shown what it shows, or is to be stopped: then nothing of that decides anything."""
+        while not self.has_read and not self.stopping:
+            self.awake.clear()
+            await self.awake.wait()
 
     async def _first_of(self, *work: Coroutine[Any, Any, None]) -> None:
         """Do several things until one ends or fails."""
@@ -308,14 +305,20 @@ class Kept:
     async def _read(self, connection: Connection) -> None:
         while True:
             self._take(await connection.read())
+            if not self.has_read:
+                self.has_read = True
+                self.awake.set()
             if self.served.is_writing:  # what was read may be what the next command waits for
                 self.urge()
 
     async def _write(self, connection: Connection) -> None:
-        if not self.started and not self.stopping:
+        if not (self.safe and self.served.is_latched):
+            await self._until_read()
+        if (not self.started or self.served.is_latched) and not self.stopping:
             if self.safe:
                 await connection.write(self.safe)
             self.started = True
+        await self._until_read()
         self.connections += 1
         if not self.stopping:
             self.served.ready()
@@ -340,7 +343,7 @@ class Kept:
                     self.served.written()
             elif is_due and heartbeat is not None:
                 beaten, due = True, loop.time() + heartbeat.every_s
-                await connection.write(((heartbeat.write, self.beat),))  # moves nothing: a stop waits for its answer
+                await self._beat(connection, heartbeat.write)
                 self.beat = (self.beat + 1) % BEATS
             else:
                 timer = None if heartbeat is None else loop.call_later(due - loop.time(), self.awake.set)
@@ -378,6 +381,14 @@ class Kept:
             raise
         finally:
             self.writing = None
+
+    async def _beat(self, connection: Connection, point: Point) -> None:
+        """Write a heartbeat, which moves nothing: a stop waits for its answer, for a while."""
+        try:
+            async with asyncio.timeout(self.document.timeout_s / 2 if self.stopping else None) as self.beating:
+                await connection.write(((point, self.beat),))
+        finally:
+            self.beating = None
 
     def _doubt(self) -> None:
         """A command was sent of which nobody knows whether it has come, or will."""

@@ -19,8 +19,8 @@ heard later things of this very journal, it ends whoever was met: its places are
 
 *Machines that another host runs*: a host that is started by mistake beside the one that has its machines would stop
 them by the safe outputs of its start, in the middle of their work. So one that nobody has ever let in leaves them alone
-until somebody does or `MEET_SECONDS` are over, and as long as another host has them. One that comes back with its
-journal drives the safe outputs at once, and so does an emergency stop.
+until somebody does or `MEET_SECONDS` are over; where another host has them, as was said by then, until it is let in.
+One that comes back with its journal drives the safe outputs at once, and so does an emergency stop.
 Rejected: to leave them alone until somebody lets it in, however long. A cell is started from its machines at rest, and
 the first host of it may wait for hours for the others.
 
@@ -142,7 +142,7 @@ class Peers:
             await self.meeting.wait()
 
     async def let_drive(self, is_urgent: Callable[[], bool]) -> None:
-        """Wait as long as another host may have the machines here, or has them, unless it becomes urgent."""
+        """Wait as long as another host may have the machines here, or is said to have them; not where it is urgent."""
         loop = asyncio.get_running_loop()
         until = loop.time() + MEET_SECONDS
         while self.is_unmet and not is_urgent() and (self.claimed or loop.time() < until):

@@ -9,12 +9,14 @@ import pytest
 from serial import Serial
 
 from firable.executor.drivers import modbus, serial_line
-from firable.executor.drivers.bench import Far
+from firable.executor.drivers.bench import Far, until
+from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.conformance import DriverConformance
 from firable.executor.drivers.device import LinkError, Wanted
 from firable.executor.drivers.far_side.line import PseudoLine
 from firable.executor.drivers.far_side.machine import ROLES
 from firable.executor.drivers.far_side.serial_device import SerialEnd
+from firable.executor.drivers.keeping import Kept, Nobody
 
 
 class TestSerialLine(DriverConformance):
@@ -41,5 +43,43 @@ def test_a_port_that_cannot_be_had_is_told_with_the_reason_in_words(kind: Any) -
         assert await refusal("/dev/nobody-is-here") == "/dev/nobody-is-here: No such file or directory"
         assert await refusal("/dev/null") == "/dev/null: this is no serial port"
         line.close()
+
+    asyncio.run(main())
+
+
+class Latched(Nobody):
+    """Whose device is latched, and is ready at some time."""
+
+    is_latched = True
+
+    def __init__(self) -> None:
+        self.is_ready = False
+
+    def ready(self) -> None:
+        """It is."""
+        self.is_ready = True
+
+
+def test_all_safe_outputs_of_a_latched_device_are_confirmed_though_it_tells_the_rest_meanwhile() -> None:
+    """Lines are confirmed by being read, and there is more to be read than one answer."""
+    points = ("o1", "o2", "o3")
+    written: list[str] = []
+
+    async def main() -> None:
+        end, latched = SerialEnd(), Latched()
+        end.line.open()
+        await end.start(lambda point, _: written.append(point))
+        end.show("s", value=1)
+        text = f"driver: serial, port: {end.line.near}, safe: {{{', '.join(f'{one}: 0' for one in points)}}}"
+        document = parse_binding(f"{{firable_bind: 1, cell: c, devices: {{D: {{{text}}}}}}}").document.devices["D"]
+        options = serial_line.SerialOptions(port=str(end.line.near))
+        kept = Kept(document, serial_line.KIND, options, Wanted(("s",), document.timeout_s), latched)
+        task = asyncio.create_task(kept.run())
+        await until(lambda: latched.is_ready, "the connection")
+        assert kept.connections == 1
+        assert tuple(written) == points
+        kept.stop()
+        await task
+        await end.stop()
 
     asyncio.run(main())

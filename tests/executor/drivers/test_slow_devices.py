@@ -115,3 +115,15 @@ def test_after_an_emergency_stop_a_connection_begins_with_the_safe_outputs_and_i
     assert {kind for kind, _ in seen[1 : 1 + len(BLOCKS)]} == {"read"}
     assert SAFE not in seen[1:]
     assert cell.asked_when_ready == [1 + len(BLOCKS)]
+
+
+def test_a_stop_does_not_wait_until_a_new_connection_was_read() -> None:
+    cell, reads = Cell(), list[tuple[str, int]]()
+
+    def when(one: tuple[str, int], kept: Kept) -> bool:
+        reads.append(one)
+        return kept.connections == 0 and len(reads) == 3
+
+    kept, asked = stopped(cell, when)
+    assert kept.is_safe
+    assert SAFE in asked[:2], "behind the one question at most that has waited before"
