@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import time
 from collections import deque
@@ -9,6 +10,8 @@ from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from functools import cache
 from itertools import takewhile
+from multiprocessing import parent_process
+from threading import Thread
 from typing import TYPE_CHECKING
 
 import click
@@ -176,10 +179,20 @@ _stopped: Event
 
 
 def _begin(stopped: Event) -> None:
-    """Begin such a process; Ctrl-C, which a terminal sends to all of them, is for the first one to hear."""
+    """Begin such a process; Ctrl-C, which a terminal sends to all of them, is for the first one to hear.
+
+    It ends with the first one, however that ends: nobody else gives it runs.
+    """
     global _stopped
     _stopped = stopped
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Thread(target=_end_with_the_first, daemon=True).start()
+
+
+def _end_with_the_first() -> None:
+    if (first := parent_process()) is not None:
+        first.join()
+        os._exit(1)
 
 
 def _part_of_all(argument: str, runs: Sequence[Run]) -> Campaign:
@@ -191,7 +204,7 @@ def _share(argument: str, chunks: Sequence[Sequence[Run]], jobs: int, done: Camp
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import Event
 
-    stopped = Event()
+    stopped, heard = Event(), signal.getsignal(signal.SIGINT)
     with ProcessPoolExecutor(jobs, initializer=_begin, initargs=(stopped,)) as pool:
         waiting: deque[Future[Campaign]] = deque()
         try:
@@ -201,10 +214,12 @@ def _share(argument: str, chunks: Sequence[Sequence[Run]], jobs: int, done: Camp
                 done.join(waiting.popleft().result())
         except KeyboardInterrupt:
             stopped.set()
+            signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is left is one run in each process
         pool.shutdown(cancel_futures=True)
         for begun in waiting if stopped.is_set() else ():
             if not begun.cancelled():
                 done.join(begun.result())
+    signal.signal(signal.SIGINT, heard)
 
 
 def _verdict(argument: str, done: Campaign, n_asked: int) -> Verdict:

@@ -3,6 +3,8 @@
 import json
 import os
 import signal
+import subprocess
+import sys
 from dataclasses import replace
 from importlib.resources import files
 from multiprocessing import active_children
@@ -10,6 +12,7 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+from support.waiting import until
 
 import firable.executor.simulation.campaign
 from firable.analysis.check import check
@@ -168,3 +171,33 @@ def test_one_run_alone_takes_nothing_that_is_for_many(
 ) -> None:
     assert main(["rehearse", "catalogue:one_robot", "--seed", "1", *more]) == 2
     assert f"--seed is one run alone, and {more[0]} is for many" in capsys.readouterr().err
+
+
+def test_processes_that_share_the_runs_end_with_the_first_one_however_that_ends() -> None:
+    command = (
+        sys.executable,
+        "-m",
+        "firable.cli",
+        "rehearse",
+        "catalogue:one_robot",
+        "--seeds",
+        "100000",
+        "--jobs",
+        "2",
+    )
+    first = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+    def runs(pid: str) -> bool:
+        try:
+            return "State:\tZ" not in Path(f"/proc/{pid}/status").read_text()
+        except OSError:
+            return False
+
+    def sharing() -> list[str]:
+        return Path(f"/proc/{first.pid}/task/{first.pid}/children").read_text().split()
+
+    until(lambda: len(sharing()) == 2, "the processes")
+    its = sharing()
+    first.kill()
+    first.wait()
+    until(lambda: not any(map(runs, its)), "their end")
