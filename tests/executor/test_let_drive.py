@@ -11,6 +11,7 @@ from firable.executor.drivers import kinds
 from firable.executor.drivers.bench import until
 from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.bound import BoundDriver, bound_driver
+from firable.executor.drivers.device import Point, Value
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.links.link import COORDINATOR, run_by_two
 from firable.executor.operating import peers
@@ -40,10 +41,10 @@ class Cell:
         await self.end.start(self._written)
         self.end.show("t", value=0)
 
-    def _written(self, point: str, value: object) -> None:
+    def _written(self, point: Point, value: Value) -> None:
         self.written.append(point)
         if point == "n":
-            self.end.show("t", value=value)  # type: ignore[arg-type]
+            self.end.show("t", value)
 
     def start(self, machines: tuple[str, ...], journal: Journal | None = None) -> Host:
         host = self.hosts.host(machines, journal or MemoryJournal())

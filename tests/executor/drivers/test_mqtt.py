@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from firable.cli.main import main
-from firable.executor.drivers.bench import Far, until
+from firable.executor.drivers.bench import Far, Heard, until
 from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.bound import BoundDriver
 from firable.executor.drivers.conformance import DriverConformance
@@ -34,37 +34,6 @@ class TestMqtt(DriverConformance):
         points = {role: f"cell/M/{role}" for role in (*ROLES, "command")}
         end = MqttEnd({points[role] for role in ("output", "beat", "code", "command")})
         yield Far(end, f"driver: mqtt, host: 127.0.0.1, port: {end.port}, {ALIVE}", points)
-
-
-class Unheard:
-    """Who listens to nothing."""
-
-    def now_seconds(self) -> float:
-        return asyncio.get_running_loop().time()
-
-    def loop_delay_seconds(self, until_seconds: float) -> float:
-        return until_seconds - self.now_seconds()
-
-    def signal(self, name: str, value: bool, entry: int | None) -> None:
-        pass
-
-    def taken(self, place: str, entry: int) -> None:
-        pass
-
-    def all_told(self) -> None:
-        pass
-
-    def moved(self) -> None:
-        pass
-
-    def driver_fault(self, machine: str, message: str) -> None:
-        pass
-
-    def driver_note(self, machine: str, message: str) -> None:
-        pass
-
-    def emergency_stop(self, reason: str) -> None:
-        pass
 
 
 @needs_mosquitto
@@ -130,9 +99,9 @@ signals:
 """)
         for turn in range(2):
             driver = BoundDriver(binding, (), frozenset())
-            running = asyncio.create_task(driver.run(Unheard(), Unheard()))
-            await until(lambda d=driver: d.readings()["lamp"].value is not None, "the lamp")  # type: ignore[misc]
-            await until(lambda d=driver: d.readings()["key"].value is not None, "the key")  # type: ignore[misc]
+            heard = Heard()
+            running = asyncio.create_task(driver.run(heard, heard))
+            await driver.met()
             found = {name: reading.value for name, reading in driver.readings().items()}
             if turn == 0:
                 driver.force("key", value=True)
