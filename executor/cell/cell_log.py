@@ -113,8 +113,10 @@ class CellLog:
 
     def add(self, at_seconds: float, what: str, *arguments: str | int) -> None:
         """Write an input, before it has its effect."""
-        self._write([at_seconds, what, *arguments, self._checked([at_seconds, what, *arguments])])
-        self.count += 1
+        whole = [at_seconds, what, *arguments]
+        check = self._check_of(whole)
+        self._write([*whole, check])
+        self.count, self.check = self.count + 1, check  # what was not written whole is none
 
     def close(self) -> None:
         """Close the file."""
@@ -132,16 +134,16 @@ class CellLog:
         try:
             *whole, check = json.loads(line)
             at_seconds, what, *arguments = whole
-            if check != self._checked(whole):
+            if check != self._check_of(whole):
                 raise ValueError("another check value")
+            self.check = check
             return float(at_seconds), str(what), tuple(arguments)
         except (ValueError, TypeError, RecursionError):
             self._refuse(f"'{printable(line[:60])}' is no line of it, or does not follow on the one before")
 
-    def _checked(self, item: list[Any]) -> int:
-        """The check value of the next line."""
-        self.check = crc32(json.dumps(item).encode(), self.check)
-        return self.check
+    def _check_of(self, item: list[Any]) -> int:
+        """The check value that the next line has."""
+        return crc32(json.dumps(item).encode(), self.check)
 
     def _refuse(self, why: str, hint: str = "run it as it was begun, or name another folder") -> NoReturn:
         message = f"{printable(str(self.path))}: not the simulated cell of this run: {why}"
