@@ -68,6 +68,8 @@ class InProcessLink:
         self.greeting = greeting
         self.listener: LinkListener | None = None
         self.peers: dict[str, InProcessLink] = {}
+        self.objected: list[InProcessLink] = []
+        """Those that were refused for what their greeting says."""
         self.standing = Standing.GOING
 
     @property
@@ -84,6 +86,7 @@ class InProcessLink:
         finally:
             self.exchange.leave(self)
             self.peers.clear()
+            self.objected.clear()
             self.listener = None
 
     def send(self, sender: str, receiver: str, message: Message) -> None:
@@ -108,6 +111,8 @@ class InProcessLink:
         here, there = self._tell(), other._tell()
         ours, theirs = here.memory, there.memory
         why = objection(self.greeting, other.greeting)
+        if why is not None:
+            self.objected.append(other)
         come_back = ours.estranged(other.greeting.names, theirs.storage)
         forgotten = theirs.estranged(self.greeting.names, ours.storage)
         if why is None and come_back is not None:
@@ -127,6 +132,10 @@ class InProcessLink:
         for name in _names_of(self.peers, other):
             del self.peers[name]
             self._tell().lost(name)
+        if other in self.objected:
+            self.objected.remove(other)
+            if all(one.greeting.names != other.greeting.names for one in self.objected):
+                self._tell().gone(other.greeting.names)
 
     def _deliver(self, peer: InProcessLink, sender: str, receiver: str, message: Message, age: int) -> None:
         # What was under way when the line was cut, or the receiver ended, is lost.

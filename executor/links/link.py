@@ -52,6 +52,8 @@ class Refusal:
     problem: Diagnostic
     are_unlike: bool = False
     """Whether the two hosts have another bundle or version: neither will let the other in with what it has."""
+    run_by_two: tuple[str, ...] = ()
+    """The machines that two hosts run."""
 
 
 Arrival = tuple[str, str, Message, int]
@@ -93,6 +95,10 @@ class LinkListener(Protocol):
 
     def refused(self, peers: Sequence[str], why: Refusal) -> None:
         """A host that says it runs these machines was refused, or refuses this one; nothing of it is delivered."""
+        ...
+
+    def gone(self, peers: Sequence[str]) -> None:
+        """No host is there any more that says it runs just these machines and was refused by this one for that."""
         ...
 
     def disowned(self, peers: Sequence[str], why: Estranged) -> None:
@@ -159,10 +165,11 @@ def objection(ours: Greeting, theirs: Greeting) -> Refusal | None:
     return None
 
 
-def run_by_two(machines: Iterable[str]) -> Refusal:
+def run_by_two(machines: Sequence[str]) -> Refusal:
     """Why the second host of these machines is refused (F5020)."""
-    message = f"{all_called(machines)} is run by two hosts"
-    return Refusal(Diagnostic("F5020", message, "each machine has one host: end one of the two"))
+    message = f"{all_called(machines)} {'is' if len(machines) == 1 else 'are'} run by two hosts"
+    hint = "each machine has one host: end one of the two"
+    return Refusal(Diagnostic("F5020", message, hint), run_by_two=tuple(machines))
 
 
 def come_back_without(why: Estranged) -> Refusal:

@@ -82,12 +82,19 @@ class _Peer:
     heard_seconds: float = 0.0
     refused: str = ""
     """The instance that was refused, which is told once."""
+    objected: tuple[str, ...] = ()
+    """Its machines, if it was refused for what its greeting says."""
     queue: deque[bytes] = field(default_factory=lambda: deque(maxlen=QUEUE_MAX))
     """Messages for it, each the line of a frame. Of too many the oldest are lost."""
     standing: Standing = Standing.GOING
     asked_at_cycle: int = 0
     is_there: bool = False
     """Of a station: whether it has answered the last poll."""
+
+    @property
+    def is_known(self) -> bool:
+        """Whether somebody was told of it."""
+        return bool(self.names or self.objected)
 
 
 class SerialLink:
@@ -204,7 +211,7 @@ class SerialLink:
                     busy |= (bool(answer.payload) and answer.kind is Kind.MESSAGES) or not was_there
                     if peer.names or greets:
                         self._heard(peer, answer)
-                elif peer.names and loop.time() - peer.heard_seconds > self.lease_seconds:
+                elif peer.is_known and loop.time() - peer.heard_seconds > self.lease_seconds:
                     self._lose(peer)
             if not busy:
                 try:
@@ -234,7 +241,7 @@ class SerialLink:
         (peer,) = self.peers.values()
         while True:
             await asyncio.sleep(self.lease_seconds / 4)
-            if peer.names and loop.time() - peer.heard_seconds > self.lease_seconds:
+            if peer.is_known and loop.time() - peer.heard_seconds > self.lease_seconds:
                 self._lose(peer)
 
     def _asked_for(self, poll: Frame) -> None:
@@ -289,6 +296,7 @@ class SerialLink:
         come_back = ours.estranged(said.greeting.names, theirs.storage)
         forgotten = theirs.estranged(self.greeting.names, ours.storage)
         why = objection(self.greeting, said.greeting)
+        objected = () if why is None else said.greeting.names
         if why is None and come_back:
             why = come_back_without(come_back)
         is_fit = why is None and not forgotten
@@ -297,6 +305,9 @@ class SerialLink:
             return
         if peer.names and (said.instance != peer.instance or not is_fit):
             self._lose(peer)  # it has been started anew: whatever was under way is gone
+        if peer.objected != objected:
+            self._say_gone(peer)
+            peer.objected = objected
         if not is_fit:
             if peer.refused != said.instance:
                 peer.refused = said.instance
@@ -324,6 +335,14 @@ class SerialLink:
         peer.queue.clear()
         for name in names:
             self._tell().lost(name)
+        self._say_gone(peer)
+
+    def _say_gone(self, peer: _Peer) -> None:
+        """Tell that a host is gone that was refused for what it had said."""
+        objected, peer.objected = peer.objected, ()
+        if objected:
+            peer.refused = ""
+            self._tell().gone(objected)
 
     def _readable(self, descriptor: int) -> None:
         self._guarded(lambda: self._read(descriptor))

@@ -94,6 +94,8 @@ class ZenohLink:
         self.identity = ""
         self.broken: asyncio.Future[None] | None = None
         self.claims: Claims | None = None
+        self.objected: dict[str, tuple[str, ...]] = {}
+        """The machines of each session that was refused for what its greeting says."""
         self.answers: dict[str, Any] = {}  # tokens, the end of which Zenoh gives no type
         """What each session is answered."""
         self.standing = Standing.GOING
@@ -146,6 +148,7 @@ class ZenohLink:
             self.session = self.listener = self.claims = None
             self.publishers.clear()
             self.answers.clear()
+            self.objected.clear()
             self.stood = None
             await asyncio.to_thread(session.close)
             self.samples.clear()  # what an earlier session has told is not so in a later one
@@ -293,7 +296,10 @@ class ZenohLink:
             greeting = Greeting(_read(digest), _all_read(machines), int(version) if version.isdecimal() else -1)
             if (why := objection(self.greeting, greeting)) is not None:
                 if not gone:
+                    self.objected[session] = greeting.names
                     listener.refused(greeting.names, why)
+                elif self.objected.pop(session, None) not in (None, *self.objected.values()):
+                    listener.gone(greeting.names)
             elif gone:
                 claims.given_up(session)
             else:

@@ -19,8 +19,9 @@ heard later things of this very journal, it ends whoever was met: its places are
 
 *Machines that another host runs*: a host that is started by mistake beside the one that has its machines would stop
 them by the safe outputs of its start, in the middle of their work. So one that nobody has ever let in leaves them alone
-until somebody does or `MEET_SECONDS` are over; where another host has them, as was said by then, until it is let in.
-One that comes back with its journal drives the safe outputs at once, and so does an emergency stop.
+until somebody does or `MEET_SECONDS` are over; where another host has them, until it is let in, or the other is gone
+and as long is over. That another has them it says itself, where the link leads to it, or one does that has let it in.
+A host that comes back with its journal drives the safe outputs at once, and so does an emergency stop.
 Rejected: to leave them alone until somebody lets it in, however long. A cell is started from its machines at rest, and
 the first host of it may wait for hours for the others.
 
@@ -101,8 +102,12 @@ class Peers:
         self.meeting = asyncio.Event()
         self.turned_away: dict[str, str] = {}
         """What is said of each that was refused and has not come back as it should."""
-        self.claimed: set[str] = set()
-        """The machines here that another host has, as somebody has said."""
+        self.rivals: set[tuple[str, ...]] = set()
+        """The machines of each host that is there, has some of those here too, and was refused for that."""
+        self.elsewhere: set[str] = set()
+        """The machines here that a third host has let another one in with, as it has said."""
+        self.is_hands_off = False
+        """Whether the machines here are left alone, because another host may have them."""
         self.unlike: set[str] = set()
         """Those that were met with another bundle or version, and not with this one since."""
         self.hopeless: asyncio.TimerHandle | None = None
@@ -141,22 +146,36 @@ class Peers:
             self.meeting.clear()
             await self.meeting.wait()
 
+    @property
+    def claimed(self) -> tuple[str, ...]:
+        """The machines here that another host has, as far as is known."""
+        return tuple(sorted(self.here & {*self.elsewhere, *(name for rival in self.rivals for name in rival)}))
+
     async def let_drive(self, is_urgent: Callable[[], bool]) -> None:
-        """Wait as long as another host may have the machines here, or is said to have them; not where it is urgent."""
+        """Wait as long as another host may have the machines here, or is said to have them; not where it is urgent.
+
+        What a host that is gone had is left alone for `MEET_SECONDS` more: a broken line may have taken it away.
+        """
         loop = asyncio.get_running_loop()
         until = loop.time() + MEET_SECONDS
-        while self.is_unmet and not is_urgent() and (self.claimed or loop.time() < until):
-            self.meeting.clear()
-            try:
-                async with asyncio.timeout_at(None if self.claimed else until):
-                    await self.meeting.wait()
-            except TimeoutError:
-                continue
-            except asyncio.CancelledError:
-                own = asyncio.current_task()
-                if own is None or not is_urgent():
-                    raise
-                own.cancel()  # of who drives by then, and on its way out drives the safe outputs
+        self.is_hands_off = True
+        try:
+            while self.is_unmet and not is_urgent() and ((claimed := self.claimed) or loop.time() < until):
+                self.meeting.clear()
+                try:
+                    async with asyncio.timeout_at(None if claimed else until):
+                        await self.meeting.wait()
+                except TimeoutError:
+                    continue
+                if claimed:
+                    until = loop.time() + MEET_SECONDS
+        except asyncio.CancelledError:
+            own = asyncio.current_task()
+            if own is None or not is_urgent():
+                raise
+            own.cancel()  # of who drives by then, and on its way out drives the safe outputs
+        finally:
+            self.is_hands_off = False
 
     async def run(self) -> None:
         """Be linked to them until cancelled; raises `InputError` where the link cannot be opened, or fails."""
@@ -202,6 +221,11 @@ class Peers:
         yield from waits(self.acts.coordinators, self.acts.controllers, self.names - self.connected_to)
         if self.is_unmet:
             yield "nothing moves here before another host of the cell has been met"
+        if self.is_hands_off and (claimed := self.claimed):
+            yield (
+                f"another host has {all_called(claimed)}: this one leaves its machines alone, and does not read their "
+                "emergency stops, until it is let in or the other is gone"
+            )
         yield from dict.fromkeys(map(self._missing, self.never_met))
 
     def absent(self) -> Iterator[str]:
@@ -298,13 +322,25 @@ class Peers:
     def refused(self, peers: Sequence[str], why: Refusal) -> None:
         """A host was refused."""
         self._turn_away(peers, f"the host of {all_called(peers)} is refused: {why.problem.message}; {why.problem.hint}")
-        self.claimed.update(self.here.intersection(peers))
+        if self.here.isdisjoint(peers):
+            self.elsewhere |= self.here.intersection(why.run_by_two)
+        else:
+            self.rivals.add(tuple(peers))
         self.meeting.set()
         if why.are_unlike:
             self.unlike.update(peers)
             if self._is_hopeless and self.hopeless is None:
                 loop = asyncio.get_running_loop()
                 self.hopeless = loop.call_later(MEET_SECONDS, self._end_if_hopeless, why.problem)
+
+    def gone(self, peers: Sequence[str]) -> None:
+        """A host that was refused is gone; what it had it may have left in the middle of something."""
+        for name in peers:
+            self.turned_away.pop(name, None)
+        self.unlike.difference_update(peers)
+        self.rivals.discard(tuple(peers))
+        self.told("gone", f"the host of {all_called(peers)} that was refused is gone")
+        self.meeting.set()
 
     @property
     def _is_hopeless(self) -> bool:

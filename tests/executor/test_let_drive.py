@@ -71,9 +71,11 @@ def test_a_host_beside_the_one_that_has_its_machines_writes_them_nothing(monkeyp
         cell.written.clear()
         mistaken = cell.start(A)
         assert (await refusal(cell.tasks[-1])).code == "F5025"  # the coordinator knows another journal
-        assert mistaken.peers.claimed == {"a"}
+        assert mistaken.peers.claimed == ("a",)
         assert cell.written == []
         await cell.end_all()
+
+    asyncio.run(main())
 
 
 def test_a_host_whose_machines_another_one_has_leaves_them_alone_until_it_is_stopped(
@@ -91,10 +93,53 @@ def test_a_host_whose_machines_another_one_has_leaves_them_alone_until_it_is_sto
         driver = mistaken.driver
         assert isinstance(driver, BoundDriver)
         assert not driver.has_begun
+        (left_alone,) = [why for why in mistaken.peers.waits() if "leaves its machines alone" in why]
+        assert left_alone.startswith("another host has 'a'")
         mistaken.stop()
         ended = await cell.tasks[-1]
         assert cell.written == []
         assert "not confirmed" not in str(ended)
+
+    asyncio.run(main())
+
+
+def test_a_host_that_a_third_one_refuses_for_another_leaves_its_machines_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the link leads to the coordinator alone, that says who has them, and has said so when it ends."""
+    monkeypatch.setattr(peers, "MEET_SECONDS", 0.1)
+
+    async def main() -> None:
+        cell = Cell(monkeypatch)
+        await cell.begin()
+        mistaken = cell.start(A)
+        await asyncio.sleep(0)
+        mistaken.peers.refused(CENTRE, run_by_two(A))
+        mistaken.peers.gone(CENTRE)
+        await asyncio.sleep(0.4)
+        assert mistaken.peers.claimed == ("a",)
+        assert cell.written == []
+        await cell.end_all()
+
+    asyncio.run(main())
+
+
+def test_machines_of_another_host_are_driven_some_time_after_that_has_gone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(peers, "MEET_SECONDS", 0.3)
+
+    async def main() -> None:
+        cell = Cell(monkeypatch)
+        await cell.begin()
+        alone = cell.start(A)
+        cell.start(A)
+        await until(lambda: alone.peers.claimed == ("a",), "the other one")
+        await asyncio.sleep(0.6)
+        assert cell.written == []
+        cell.tasks.pop().cancel()
+        await until(lambda: not alone.peers.claimed, "its end")
+        assert cell.written == []
+        assert alone.peers.is_hands_off
+        await until(lambda: cell.written == ["out"], "the safe outputs")
+        assert not [why for why in alone.peers.waits() if "leaves its machines alone" in why]
+        await cell.end_all()
 
     asyncio.run(main())
 

@@ -32,6 +32,7 @@ class Heard:
     ages: list[int] = field(default_factory=list)
     """Those of the messages."""
     problems: list[Diagnostic] = field(default_factory=list)
+    run_by_two: set[str] = field(default_factory=set)
     waiters: list[asyncio.Future[None]] = field(default_factory=list)
     memory: Memory = field(default_factory=lambda: Memory(Storage(os.urandom(4).hex())))
 
@@ -63,6 +64,11 @@ class Heard:
     def refused(self, peers: Sequence[str], why: Refusal) -> None:
         self.told += [("refused", peer) for peer in peers]
         self.problems.append(why.problem)
+        self.run_by_two.update(why.run_by_two)
+        self._wake()
+
+    def gone(self, peers: Sequence[str]) -> None:
+        self.told += [("gone", peer) for peer in peers]
         self._wake()
 
     def disowned(self, peers: Sequence[str], why: Estranged) -> None:

@@ -70,6 +70,9 @@ class Party:
         assert peers
         self.refusals.append(why.problem)
 
+    def gone(self, peers: Sequence[str]) -> None:
+        raise AssertionError(f"claims refuse {peers} by an answer, which is taken back")
+
     def disowned(self, peers: Sequence[str], why: Estranged) -> None:
         self.refusals.append(known_otherwise(why, peers))
         self.disowned_by.update(peers)

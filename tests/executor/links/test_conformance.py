@@ -110,6 +110,23 @@ class TestLink:
 
         run(make, main())
 
+    def test_of_a_host_that_was_refused_is_told_that_it_is_gone_and_of_the_right_one_that_it_is_there(
+        self, make: Make
+    ) -> None:
+        async def main() -> None:
+            async with make() as rig, asyncio.timeout(PATIENCE_SECONDS), running(rig.link(CENTRE)) as centre:
+                for times in (1, 2):
+                    async with running(rig.link(replace(ROBOT, digest="d2"))):
+                        await told_so_often(centre, ("refused", "robot"), times)
+                        assert centre.told.count(("gone", "robot")) == times - 1
+                    await told_so_often(centre, ("gone", "robot"), times)
+                async with running(rig.link(ROBOT)):
+                    await centre.until_told(("connected", "robot"))
+                await centre.until_told(("lost", "robot"))
+                assert centre.told.count(("gone", "robot")) == 2
+
+        run(make, main())
+
     def test_a_cut_line_is_noticed_by_both_and_mends(self, make: Make) -> None:
         async def main() -> None:
             async with make() as rig:

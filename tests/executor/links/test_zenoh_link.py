@@ -74,6 +74,7 @@ def test_of_two_hosts_with_one_name_the_first_is_heard_until_it_ends() -> None:
                 assert "two hosts" in centre.problems[0].message
                 await two.until_told(("refused", COORDINATOR))
                 assert "'robot' is run by two hosts" in {problem.message for problem in two.problems}
+                assert two.run_by_two == {"robot"}  # and it is not that one who has said so
                 while not one.messages:
                     second.send("robot", COORDINATOR, Report("robot", Readiness(0, frozenset())))
                     here.send(COORDINATOR, "robot", message)
