@@ -46,7 +46,7 @@ _HINT = "put the interlock into the machine's own controller, or make the signal
 
 def name_of(assumption: Assumption) -> str:
     """The name of the verdict on an assumption."""
-    return f"o4.{assumption.transition}.{assumption.signal}"
+    return f"o4.{assumption.transition}/{assumption.signal}"
 
 
 @dataclass(frozen=True)

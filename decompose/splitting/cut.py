@@ -157,6 +157,15 @@ def _problems(net: Net) -> Iterator[Diagnostic]:
                 "nest what has no owner under one of the `controllers`",
                 (kind, orphans[0]),
             )
+    for kind, named in (("controllers", net.controllers), ("transitions", net.transitions)):
+        for item in named:
+            if "/" in item.name:  # `vote/T/C` would be the vote of C on T, or what somebody has called so
+                yield Diagnostic(
+                    "F4001",
+                    f"'{item.name}' has a '/' in its name, by which proofs part the names of what they add to the net",
+                    "rename it, with another character in its place",
+                    (kind, item.name),
+                )
     for name in unowned(net):
         transition = net.transition(name)
         if (

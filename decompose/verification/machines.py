@@ -172,7 +172,7 @@ def _asked(cut: Cut, loop: ClosedLoop) -> Iterator[Question]:
             if gate.wanted and completion:
                 completions[f"{gate.signal} for {row.name}"] = _never(f"o4.completion.{len(completions)}", question)
                 continue
-            name = f"o4.{row.name}.{gate.signal}"
+            name = f"o4.{row.name}/{gate.signal}"
             sentence = f"'{gate.signal}' stays {int(gate.wanted)} from the vote for '{row.name}' until it fires"
             yield Question(name, sentence, {gate.signal: _never(name, question)})
     yield Question("o4.completions", _COMPLETIONS, completions)

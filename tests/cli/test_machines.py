@@ -157,7 +157,7 @@ def test_a_bundle_that_the_machines_forbid_ends_with_a_report_of_what_is_violate
     bundle = tmp_path / "cell.bundle"
     assert main(["bundle", CELL, "-o", str(bundle), "--machines", str(plant)]) == 1
     told = capsys.readouterr()
-    assert "✗ violated  o4.G4.mc.part_present" in told.out
+    assert "✗ violated  o4.G4/mc.part_present" in told.out
     assert "`firable prove NET --machines PLANT` shows the run" in told.out
     assert "`firable check NET --machines PLANT` shows the run" in told.out
     assert "violated: 2 violated" in told.out
@@ -170,7 +170,7 @@ def test_prove_asks_the_assumptions_of_the_machines(capsys: pytest.CaptureFixtur
     assert main(["prove", CELL, "--machines", PLANT]) == 0
     told = capsys.readouterr().out
     assert "shown in the loop: with the machines that were given" in told
-    assert "✓ proved    o4.G4.mc.part_present" in told
+    assert "✓ proved    o4.G4/mc.part_present" in told
     assert "assumed of the cell" not in told
 
 

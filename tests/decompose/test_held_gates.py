@@ -9,7 +9,7 @@ from firable.analysis.evidence.checking.checker import check_document
 from firable.analysis.evidence.document import document_from_text
 from firable.analysis.loop.verdicts import check_loop
 from firable.analysis.spaces.reachability import explore
-from firable.decompose.proofs.assumptions import assumptions
+from firable.decompose.proofs.assumptions import Assumption, assumptions
 from firable.decompose.proofs.held_gates import COMMANDS, COMPLETIONS, held_gates, name_of
 from firable.decompose.splitting.cut import split
 from firable.nets.catalogue import catalogue_net, catalogue_path, catalogue_plant
@@ -21,7 +21,7 @@ from firable.nets.text import parse_net
 from firable.nets.verdict import Status
 from firable.semantics.player import Player
 
-LINGERS = "o4.G1.conveyor.part_at_entry"
+LINGERS = "o4.G1/conveyor.part_at_entry"
 CELLS = ["one_robot", "one_robot_mc_late", "one_robot_mc_late_capacity", "two_robots_shared", "two_robots_separate"]
 
 
@@ -42,7 +42,7 @@ def test_the_machines_of_the_catalogue_keep_every_assumption(cell: str) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "name", "move", "others"),
     [
-        ("{occupied: mc_table}", "{occupied: mc_table, may_flicker: true}", "o4.G4.mc.part_present", "drops", set()),
+        ("{occupied: mc_table}", "{occupied: mc_table, may_flicker: true}", "o4.G4/mc.part_present", "drops", set()),
         ("{occupied: cv1_entry}", "{occupied: cv1_entry, may_linger: true}", LINGERS, "clears", {COMMANDS}),
     ],
 )
@@ -56,13 +56,13 @@ def test_a_sensor_that_is_not_exact_breaks_its_assumption(
     assert broken.status is Status.VIOLATED
     assert "interlock" in broken.hint
     assert broken.witness is not None
-    assert broken.witness.firings[-1] == (f"{name.split('.', 2)[2]}/{move}",)
+    assert broken.witness.firings[-1] == (f"{name.partition('/')[2]}/{move}",)
     # An entry that seems to be taken lets the conveyor start with nothing on it.
     assert {verdict.name for verdict in verdicts.values() if not verdict.holds} == others
 
     loop = held_gates(split(net), plant).loop
     player, marking = Player(loop.net), loop.net.initial_marking
-    place, means = loop.shown[name.split(".", 2)[2]]
+    place, means = loop.shown[name.partition("/")[2]]
     shown = []
     for (fired,) in broken.witness.firings:
         shown.append(bool(marking >> loop.net.place_index[place] & 1) == means)
@@ -84,7 +84,7 @@ def test_a_gate_that_another_machine_closes_is_found() -> None:
     )
     net = parse_net(wrong)
     verdicts = {verdict.name: verdict for verdict in held_gates(split(net), plant).verdicts}
-    taken = verdicts["o4.G6.mc.entry_taken"]
+    taken = verdicts["o4.G6/mc.entry_taken"]
     assert taken.status is Status.VIOLATED
     assert taken.witness is not None
     assert taken.witness.firings[-1] == ("arrives/cv1_entry",)
@@ -126,10 +126,14 @@ sensors:
 """
 
 
+def test_two_gates_whose_names_are_one_without_what_parts_them_are_two_questions() -> None:
+    assert name_of(Assumption("G", "b.c.s", wanted=True)) != name_of(Assumption("G.b", "c.s", wanted=True))
+
+
 def test_the_gate_of_a_local_transition_that_the_coordinator_decides_is_asked_of_the_machines() -> None:
     decomposition = split(parse_net(LOCAL_BESIDE_GLOBAL))
     exact = held_gates(decomposition, parse_plant(ITS_MACHINE)).verdicts
-    assert [verdict.name for verdict in exact] == ["o4.l.a.door", COMPLETIONS, COMMANDS]
+    assert [verdict.name for verdict in exact] == ["o4.l/a.door", COMPLETIONS, COMMANDS]
     assert all(verdict.holds for verdict in exact)
     flickering = parse_plant(ITS_MACHINE.replace("{occupied: entry}", "{occupied: entry, may_flicker: true}"))
     broken = held_gates(decomposition, flickering).verdicts[0]
@@ -189,6 +193,6 @@ def test_the_verdicts_leave_evidence_that_the_checker_confirms() -> None:
     held = held_gates(split(net), catalogue_plant("one_robot"))
     (text,) = held.evidence().values()
     checked = list(check_document(document_from_text(text.decode())))
-    asked = ["o4.G1.conveyor.part_at_entry", "o4.G4.mc.part_present", "o4.completion.0"]
+    asked = ["o4.G1/conveyor.part_at_entry", "o4.G4/mc.part_present", "o4.completion.0"]
     assert [one.record.name for one in checked][:3] == [f"property.{name}" for name in asked]
     assert all(one.shown and one.record.proved and not one.only_claimed for one in checked)

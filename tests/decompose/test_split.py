@@ -173,6 +173,18 @@ def test_local_transition_with_the_name_of_a_part_is_refused() -> None:
     assert split(whole).table[0].parts[1] == Part("b", "t2-12")
 
 
+@pytest.mark.parametrize("name", ["life/dies", "hold/G/a", "vote/G"])
+def test_names_that_proofs_could_give_to_what_they_add_are_refused(name: str) -> None:
+    """Or `life/dies` would be a transition of the net and the death of a host."""
+    places = (Place("a.p", "a", marked=True), Place("b.q", "b"))
+    net = Net("n", places, (Transition(name, ("a.p",), ("b.q",)),), controllers=(Controller("a"), Controller("b")))
+    assert codes(net) == [("F4001", ("transitions", name))]
+    owned = Place(f"{name}.p", name, marked=True)
+    crossing = Transition("G", (owned.name,), ("b.q",))
+    net = Net("n", (owned, places[1]), (crossing,), controllers=(Controller(name), Controller("b")))
+    assert codes(net) == [("F4001", ("controllers", name))]
+
+
 def test_completion_signal_of_another_controller_is_refused() -> None:
     net = Net(
         "n",
