@@ -135,6 +135,9 @@ def run(
         raise click.UsageError(
             "in virtual time a run is over before anybody acts: with --serve or --open, name --speed 1 or 10"
         )
+    for name in () if is_simulated else ("workpieces", "seed", "speed"):
+        if is_given(name):
+            raise click.UsageError(f"--{name} is of the simulated cell, which this run has not (--bind, --controller)")
     if options.is_one_of_several and step:
         raise click.UsageError("--step is of a whole run: on one host of several, `firable operate` steps (--serve)")
     if options.is_one_of_several and (plant is not None or watch == "stop") and options.bind is None:

@@ -275,6 +275,15 @@ def test_a_word_on_no_command_or_of_no_run_that_is_taken_up_is_refused(
     assert words in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("option", [("--workpieces", "3"), ("--seed", "1"), ("--speed", "10")], ids=lambda o: o[0])
+@pytest.mark.parametrize("real", [("--bind", "b.yaml"), ("--controller", "robot", "--dry-run", "1")], ids=lambda o: o[0])
+def test_what_only_a_simulated_cell_heeds_is_refused_of_real_machines(
+    option: tuple[str, str], real: tuple[str, ...], bundle: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", bundle, *real, *option]) == 2
+    assert f"{option[0]} is of the simulated cell, which this run has not" in capsys.readouterr().err
+
+
 def test_a_word_on_a_command_that_nobody_asks_after_is_told(
     bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
