@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
@@ -11,7 +12,6 @@ from contextlib import suppress
 from functools import cache
 from itertools import takewhile
 from multiprocessing import parent_process
-from threading import Thread
 from typing import TYPE_CHECKING
 
 import click
@@ -22,7 +22,6 @@ from firable.cli.options import answer, format_option, is_given, load_net
 from firable.cli.report import Report
 
 if TYPE_CHECKING:
-    from concurrent.futures import Future
     from multiprocessing.synchronize import Event
 
     from firable.executor.simulation.campaign import Campaign, Run
@@ -33,6 +32,7 @@ _OF = {"--seeds": "seeds", "--from": "first", "--jobs": "jobs"}
 _CHUNK = 50
 _SEEDS_PER_NET = 10
 _FAILURES_MAX = 5
+_LOOK_SECONDS = 0.2  # between two looks whether Ctrl-C was pressed
 
 
 @click.command(short_help="Run a cell's controllers through crashes and faults, many times, from seeds.")
@@ -186,7 +186,7 @@ def _begin(stopped: Event) -> None:
     global _stopped
     _stopped = stopped
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    Thread(target=_end_with_the_first, daemon=True).start()
+    threading.Thread(target=_end_with_the_first, daemon=True).start()
 
 
 def _end_with_the_first() -> None:
@@ -200,26 +200,30 @@ def _part_of_all(argument: str, runs: Sequence[Run]) -> Campaign:
 
 
 def _share(argument: str, chunks: Sequence[Sequence[Run]], jobs: int, done: Campaign) -> None:
-    """Let several processes share the runs, and join what they come to in the order of the chunks."""
-    from concurrent.futures import ProcessPoolExecutor
+    """Let several processes share the runs, and join what they come to in the order of the chunks.
+
+    Ctrl-C is noted and looked for. As an exception it may be raised where nobody lets it through, in a callback of the
+    garbage collector say, and is lost.
+    """
+    from concurrent.futures import ProcessPoolExecutor, wait
     from multiprocessing import Event
 
-    stopped, heard = Event(), signal.getsignal(signal.SIGINT)
-    with ProcessPoolExecutor(jobs, initializer=_begin, initargs=(stopped,)) as pool:
-        waiting: deque[Future[Campaign]] = deque()
-        try:
-            waiting.extend(pool.submit(_part_of_all, argument, chunk) for chunk in chunks)
-            while waiting and len(done.failed) < _FAILURES_MAX:
-                waiting[0].result()
-                done.join(waiting.popleft().result())
-        except KeyboardInterrupt:
-            stopped.set()
-            signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is left is one run in each process
-        pool.shutdown(cancel_futures=True)
-        for begun in waiting if stopped.is_set() else ():
-            if not begun.cancelled():
-                done.join(begun.result())
-    signal.signal(signal.SIGINT, heard)
+    stopped, pressed = Event(), threading.Event()
+    heard = signal.signal(signal.SIGINT, lambda *_: pressed.set())
+    try:
+        with ProcessPoolExecutor(jobs, initializer=_begin, initargs=(stopped,)) as pool:
+            waiting = deque(pool.submit(_part_of_all, argument, chunk) for chunk in chunks)
+            while waiting and len(done.failed) < _FAILURES_MAX and not pressed.is_set():
+                if wait([waiting[0]], _LOOK_SECONDS).done:
+                    done.join(waiting.popleft().result())
+            if pressed.is_set():
+                stopped.set()  # what is left is one run in each process
+            pool.shutdown(cancel_futures=True)
+            for begun in waiting if pressed.is_set() else ():
+                if not begun.cancelled():
+                    done.join(begun.result())
+    finally:
+        signal.signal(signal.SIGINT, heard)
 
 
 def _verdict(argument: str, done: Campaign, n_asked: int) -> Verdict:
