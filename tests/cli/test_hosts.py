@@ -135,8 +135,9 @@ def test_a_host_with_another_bundle_is_refused_by_name(bundle: str, tmp_path: Pa
             assert "Traceback" not in there.stderr
             assert here.stderr is not None
             # A busy machine may start the other host so late that it is told to be missing before it is refused.
-            first = next(line for line in here.stderr if "was never reached" not in line)
-            assert "refused: the host of 'mc' is refused: 'mc' holds another bundle" in first
+            told = (line for line in here.stderr if "was never reached" not in line)
+            assert "refused: the host of 'mc' is refused: 'mc' holds another bundle" in next(told)
+            assert "gone: the host of 'mc' that was refused is gone" in next(told)
         assert here.poll() is None
     finally:
         here.kill()

@@ -338,6 +338,107 @@ fn runs_that_go_on_for_ever_are_told_from_those_that_a_set_or_a_chain_ends() {
     }
 }
 
+/// A net that is made of processes, which do things in turn, side by side, as chosen, and over again.
+struct Processes {
+    naive: Naive,
+    most: u32,
+}
+
+impl Processes {
+    fn drawn(numbers: &mut Numbers) -> Naive {
+        let mut drawn = Processes { naive: Naive { places: 0, transitions: Vec::new(), initial: Vec::new() }, most: 0 };
+        for _ in 0..1 + numbers.below(2) {
+            let [from, to] = [drawn.place(), drawn.place()];
+            drawn.naive.initial.push(from);
+            drawn.most = drawn.naive.places + 5;
+            drawn.block(numbers, from, to);
+            if numbers.below(2) == 0 {
+                drawn.block(numbers, to, from);
+            }
+        }
+        let places = u64::from(drawn.naive.places);
+        for _ in 0..numbers.below(3) {
+            let (t, place) =
+                (numbers.below(drawn.naive.transitions.len() as u64) as usize, numbers.below(places) as u32);
+            let changed = &mut drawn.naive.transitions[t];
+            // A gate; or an arc, by which tokens may meet where they should not, or be lost, or nothing can fire.
+            match numbers.below(10) {
+                0..3 => changed.permissive = vec![place],
+                3..6 => changed.inhibitive = vec![place],
+                6 | 7 if !changed.inputs.contains(&place) => changed.inputs.push(place),
+                8 if !changed.outputs.contains(&place) => changed.outputs.push(place),
+                _ => changed.literals = vec![(0, false), (0, true)],
+            }
+            changed.inputs.sort_unstable();
+            changed.outputs.sort_unstable();
+        }
+        if numbers.below(8) == 0 {
+            drawn.naive.initial.push(numbers.below(places) as u32);
+        }
+        drawn.naive
+    }
+
+    fn place(&mut self) -> u32 {
+        self.naive.places += 1;
+        self.naive.places - 1
+    }
+
+    fn arc(&mut self, from: &[u32], to: &[u32]) {
+        self.naive.transitions.push(Transition::new(from, to, &[], &[], &[]));
+    }
+
+    fn block(&mut self, numbers: &mut Numbers, from: u32, to: u32) {
+        let kind = if self.naive.places < self.most { numbers.below(6) } else { 0 };
+        match kind {
+            1 | 2 => {
+                let between = self.place();
+                self.block(numbers, from, between);
+                self.block(numbers, between, to);
+            }
+            3 => [0, 1].into_iter().for_each(|_| self.block(numbers, from, to)),
+            4 => {
+                let ends = [0, 1].map(|_| [self.place(), self.place()]);
+                self.arc(&[from], &[ends[0][0], ends[1][0]]);
+                ends.iter().for_each(|&[from, to]| self.block(numbers, from, to));
+                self.arc(&[ends[0][1], ends[1][1]], &[to]);
+            }
+            5 => {
+                self.block(numbers, from, to);
+                self.arc(&[to], &[from]);
+            }
+            _ => self.arc(&[from], &[to]),
+        }
+    }
+}
+
+#[test]
+fn places_that_were_merged_for_the_search_are_told_apart_in_what_it_finds() {
+    let mut numbers = Numbers(0x9e37_79b9_7f4a_7c15);
+    for _ in 0..4000 * factor() {
+        let naive = Processes::drawn(&mut numbers);
+        let (places, transitions, initial) = (naive.places as usize, naive.transitions.clone(), naive.initial.clone());
+        let space = watched(|watch| Symbolic::explore(places, transitions, initial, 1 << 24, None, watch));
+        let mut both = Both { naive, space };
+        let start: Set = [mask(&both.naive.initial)].into();
+        let reach = both.naive.closure(&start, |_| true);
+        let root = both.space.reach;
+        both.check(root, &reach, "reach");
+        assert_eq!(both.set(&start), both.space.start);
+        let alive = reach
+            .iter()
+            .copied()
+            .filter(|&m| (0..both.naive.transitions.len()).any(|t| both.naive.firable(t, m)))
+            .collect();
+        let found = watched(|watch| both.space.all(&[], root, Events::Tests, watch));
+        both.check(found, &alive, "alive");
+        let targets = some_of(&mut numbers, &reach);
+        let backward = both.naive.backward(&reach, &targets, &reach);
+        let node = both.set(&targets);
+        let found = watched(|watch| both.space.backward(&[], node, root, None, watch));
+        both.check(found, &backward, "backward");
+    }
+}
+
 /// Counters that come to their end after as many steps as they have places, and beside them a ring that never does.
 fn counters_and_ring(counters: u32, length: u32) -> (usize, Vec<Transition>, Vec<u32>) {
     let arc = |from: u32, to: u32| Transition::new(&[from], &[to], &[], &[], &[]);

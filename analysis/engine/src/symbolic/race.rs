@@ -156,8 +156,8 @@ fn drop_twins(field: &mut Vec<Racer>) {
 }
 
 impl Symbolic {
-    /// The reachable markings, or why they were not found; `orders` replaces the candidates of `order`.
-    pub fn explore(
+    /// The reachable markings in the order that finds them first.
+    pub(super) fn raced(
         places: usize,
         transitions: Vec<Transition>,
         initial: Vec<u32>,

@@ -49,6 +49,17 @@ impl Symbolic {
         let (fired, nodes) = (search.fired(), ordered.diagram.store.used());
         search.finish(&ordered.diagram);
         ordered.diagram.store.memory.allow(bytes);
+        Self::new((ordered, start), transitions, initial, reach, (fired, nodes))
+    }
+
+    /// The space of these markings, with what finding them took.
+    pub(super) fn new(
+        (ordered, start): (Ordered, Node),
+        transitions: Vec<Transition>,
+        initial: Vec<u32>,
+        reach: Node,
+        (fired, nodes): (u64, usize),
+    ) -> Self {
         Symbolic { transitions, ordered, reach, start, initial, fired, nodes, layers_work: LAYERS_WORK }
     }
 

@@ -144,6 +144,11 @@ impl Store {
         cell.lo == lo && cell.hi == hi && cell.level == level
     }
 
+    /// One more than the greatest number of a node.
+    pub(super) fn len(&self) -> usize {
+        self.cells.len()
+    }
+
     /// How many nodes are stored, dead ones included.
     pub fn used(&self) -> usize {
         self.used

@@ -1,0 +1,120 @@
+//! What the places of a smaller net stand for, and the markings of the net itself brought back into the diagram.
+//!
+//! The places that one place stands for have levels of their own, one after the other, where it had one. So each node of
+//! the small diagram becomes as many as it stands for places, and the diagram is larger by no more than that, whatever
+//! the number of markings that come back. What stands in what is as deep as there were rounds of merging, so the recursion
+//! over that is bounded.
+
+use super::merging::{Merged, merged};
+use super::order::Order;
+use super::ordered::{Events, Ordered};
+use super::space::Symbolic;
+use super::zdd::{EMPTY, Node, Store, UNIT};
+use crate::budget::{Stop, Watch};
+use crate::net::Transition;
+
+/// No node yet.
+const NONE: Node = Node::MAX;
+
+/// What a place of the smaller net stands for, when it holds a token.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Stands {
+    /// A place of the net.
+    Place(u32),
+    /// A token on exactly one of these.
+    One(Vec<Stands>),
+    /// A token on all of these.
+    All(Vec<Stands>),
+}
+
+impl Stands {
+    /// The places of the net, in the order of their levels from the highest to the lowest.
+    pub(super) fn places(&self, found: &mut Vec<u32>) {
+        match self {
+            Stands::Place(place) => found.push(*place),
+            Stands::One(all) | Stands::All(all) => all.iter().for_each(|each| each.places(found)),
+        }
+    }
+
+    /// The markings in which it holds with those of one set below it, and is empty with those of the other one.
+    pub(super) fn over(&self, store: &mut Store, level_of: &[u32], with: Node, without: Node) -> Result<Node, Stop> {
+        match self {
+            Stands::Place(place) => store.node(level_of[*place as usize], without, with),
+            Stands::One(all) => {
+                all.iter().rev().try_fold(without, |without, each| each.over(store, level_of, with, without))
+            }
+            Stands::All(all) => all.iter().enumerate().rev().try_fold(with, |with, (at, each)| {
+                each.over(store, level_of, with, if at == 0 { without } else { EMPTY })
+            }),
+        }
+    }
+}
+
+impl Symbolic {
+    /// The reachable markings, or why they were not found; `orders` replaces the candidates of `order`.
+    pub fn explore(
+        places: usize,
+        transitions: Vec<Transition>,
+        initial: Vec<u32>,
+        bytes: usize,
+        orders: Option<Vec<Order>>,
+        watch: &mut Watch<'_>,
+    ) -> Result<Self, Stop> {
+        if orders.is_none()
+            && let Some(smaller) = merged(places, &transitions, &initial, watch)?
+            && let Some(found) = Self::through(smaller, &transitions, &initial, bytes, watch)?
+        {
+            return Ok(found);
+        }
+        Self::raced(places, transitions, initial, bytes, orders, watch)
+    }
+
+    /// The same by way of a smaller net; None where that has contact, and so does not stand for the net.
+    fn through(
+        smaller: Merged,
+        transitions: &[Transition],
+        initial: &[u32],
+        bytes: usize,
+        watch: &mut Watch<'_>,
+    ) -> Result<Option<Self>, Stop> {
+        let Merged { transitions: its, initial: begin, stands } = smaller;
+        let mut small = Self::raced(stands.len(), its, begin, bytes, None, watch)?;
+        let reach = small.reach;
+        if small.all(&[], reach, Events::Contacts, watch)? != EMPTY {
+            return Ok(None);
+        }
+        let mut order = Order::new();
+        for &place in &small.place_at()[1..] {
+            let from = order.len();
+            stands[place as usize].places(&mut order);
+            order[from..].reverse();
+        }
+        let room = bytes.saturating_sub(small.bytes());
+        let mut ordered = Ordered::new(transitions, initial, &order, room)?;
+        let start = ordered.single(initial)?;
+        let place_at = small.place_at().to_vec();
+        let of = &small.diagram().store;
+        let store = &mut ordered.diagram.store;
+        let mut brought = store.memory.filled(NONE, of.len())?;
+        (brought[EMPTY as usize], brought[UNIT as usize]) = (EMPTY, UNIT);
+        let mut todo = vec![reach];
+        while let Some(&node) = todo.last() {
+            watch.tick(1)?;
+            let (without, with) = (brought[of.lo(node) as usize], brought[of.hi(node) as usize]);
+            if brought[node as usize] != NONE {
+                todo.pop();
+            } else if without != NONE && with != NONE {
+                let place = place_at[of.level(node) as usize];
+                brought[node as usize] = stands[place as usize].over(store, &ordered.level_of, with, without)?;
+                todo.pop();
+            } else {
+                todo.extend([of.lo(node), of.hi(node)].into_iter().filter(|&part| brought[part as usize] == NONE));
+            }
+        }
+        let (fired, nodes, reach) = (small.fired, small.nodes, brought[reach as usize]);
+        store.memory.release(brought.len() * size_of::<Node>());
+        drop(small);
+        ordered.diagram.store.memory.allow(bytes);
+        Ok(Some(Symbolic::new((ordered, start), transitions.to_vec(), initial.to_vec(), reach, (fired, nodes))))
+    }
+}
