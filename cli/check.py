@@ -13,7 +13,7 @@ from firable.analysis.methods import Method
 from firable.cli import text
 from firable.cli.choice import OneOf
 from firable.cli.evidence_files import is_evidence
-from firable.cli.files import FOLDER, READ, WRITTEN, net_files
+from firable.cli.files import FOLDER, NETS, READ, WRITTEN, net_files
 from firable.cli.loop import loop_report, machines_option, show_loop
 from firable.cli.net_files import demand_a_net_file
 from firable.cli.options import (
@@ -22,7 +22,7 @@ from firable.cli.options import (
     budget,
     formats_option,
     is_given,
-    load_net,
+    load_found,
     page_option,
     with_page,
     write_folder,
@@ -69,7 +69,7 @@ class _Asked:
 
 
 @click.command(short_help="Check nets: deadlock, contact, liveness, conflicts, their own properties.")
-@click.argument("nets", metavar="NET...", type=READ, nargs=-1, required=True)
+@click.argument("nets", metavar="NET...", type=NETS, nargs=-1, required=True)
 @click.option(
     "--discipline",
     type=OneOf(["interleaving", "step"]),
@@ -147,7 +147,8 @@ def check(
     Deadlock, contact, dead and live transitions, conflicts, gate races, commands, the properties that the file itself
     states, and queries in CTL, LTL and more (docs/queries.md). Each verdict is proved, violated (with a firing
     sequence, a shortest one where exploring found it) or unknown (with the bound reached); Ctrl-C ends the search and
-    shows what is known so far. A folder stands for the net files (*.firable.yaml) below it.
+    shows what is known so far. A folder stands for the net files (*.firable.yaml) below it, but for those in hidden
+    folders and of what is installed there (virtual environments, node_modules).
 
     With --machines the external gates are no longer free: they open as the machines of the plant allow. What differs
     is shown side by side, and what a fault of each machine leads to.
@@ -188,7 +189,7 @@ def _report(argument: str, asked: _Asked, evidence_dir: str | None, *, many: boo
     from firable.cli.cache import key_of, opened_cache
     from firable.nets.verdict import held_to
 
-    loaded = load_net(argument)
+    loaded = load_found(argument)
     net = loaded.net
     queries = _queries(loaded, asked)
     cache = opened_cache() if asked.cached else None

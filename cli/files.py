@@ -17,41 +17,66 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+if TYPE_CHECKING:
+    from firable.nets.diagnostics import InputError
+
 CATALOGUE: Final = "catalogue:"
 NET_FILES: Final = (".firable.yaml", ".firable.yml")
+FOLDERS_MAX: Final = 20_000
+"""So many folders are searched for net files, in about a second: more than projects have, and less than disks."""
+_INSTALLED: Final = frozenset({"node_modules"})  # virtual environments are known by what is in them
 _NAMED: Final = "firable.files"  # where the context of a command keeps the files named so far
 
 
 def net_files(arguments: Sequence[str]) -> tuple[str, ...]:
     """The arguments, with every folder replaced by the net files below it, in the order of their names.
 
-    What cannot be read stays, for `load_net` to refuse: a folder without a net file, one that may not be looked into.
+    What cannot be read stays, for who loads it to refuse: a folder without a net file, one that may not be looked into,
+    one with too many folders below it.
     """
+    from firable.nets.diagnostics import InputError
+
     found: list[str] = []
     for argument in arguments:
-        found += [str(path) for path in sorted(nets_below(argument))] or [argument]
+        try:
+            below = sorted(nets_below(argument))
+        except InputError:
+            below = []
+        found += [str(path) for path in below] or [argument]
     return tuple(found)
 
 
-def nets_below(argument: str) -> Iterator[Path]:
+def nets_below(argument: str) -> list[Path]:
     """The net files of a project, and the folders that may not be looked into; none where the argument is no folder.
 
-    There are none in hidden folders, nor in what is installed there, which has a catalogue.
+    There are none in hidden folders, nor in what is installed there, which has a catalogue. Raises `InputError` F1001
+    where more folders are below than a project has: whoever names a whole disk did not mean all of it.
     """
     if not is_folder(argument):
-        return
+        return []
     refused: list[OSError] = []
-    for here, folders, files in os.walk(argument, onerror=refused.append):
+    found: list[Path] = []
+    for n_folders, (here, folders, files) in enumerate(os.walk(argument, onerror=refused.append), 1):
+        if n_folders > FOLDERS_MAX:
+            raise _too_many_folders(argument)
         if "pyvenv.cfg" in files and here != argument:
             folders.clear()
             continue
-        folders[:] = [one for one in folders if not one.startswith(".")]
-        yield from (path for one in files if one.endswith(NET_FILES) and _is_there(path := Path(here, one)))
-    yield from (Path(error.filename) for error in refused)
+        folders[:] = [one for one in folders if not one.startswith(".") and one not in _INSTALLED]
+        found += (path for one in files if one.endswith(NET_FILES) and _is_there(path := Path(here, one)))
+    return [*found, *(Path(error.filename) for error in refused)]
+
+
+def _too_many_folders(argument: str) -> InputError:
+    from firable.nets.diagnostics import Diagnostic, InputError
+    from firable.nets.source import printable
+
+    message = f"{printable(argument)}: more than {FOLDERS_MAX:,} folders are below it, and are not searched for nets"
+    return InputError([Diagnostic("F1001", message, "name the folder of a project, or net files")])
 
 
 def _is_there(path: Path) -> bool:
@@ -78,15 +103,20 @@ def journal_files(journal: str) -> tuple[str, ...]:
 
 
 def _read(argument: str) -> Iterable[str]:
-    """The files that are read where a file, a folder of nets or `catalogue:NAME` is named."""
+    """The files that are read where a file or `catalogue:NAME` is named."""
     if not argument.startswith(CATALOGUE):
-        return net_files([argument])
+        return (argument,)
     from firable.nets.catalogue import catalogue_names, catalogue_path
 
     name = argument.removeprefix(CATALOGUE)
     if name not in catalogue_names():
         return ()
     return str(catalogue_path(name)), str(catalogue_path(name).with_name(f"{name}.plant.yaml"))
+
+
+def _read_below(argument: str) -> Iterable[str]:
+    """The same where a folder stands for the net files below it."""
+    return net_files([argument]) if is_folder(argument) else _read(argument)
 
 
 def _written(argument: str) -> Iterable[str]:
@@ -120,7 +150,9 @@ class FileType(click.types.StringParamType):
 
 
 READ: Final = FileType(_read, is_written=False)
-"""A file that is read; of nets, a folder or `catalogue:NAME` too."""
+"""A file that is read, or `catalogue:NAME`."""
+NETS: Final = FileType(_read_below, is_written=False)
+"""Such a file, or a folder, which stands for the net files below it."""
 WRITTEN: Final = FileType(_written, is_written=True)
 """A file that is written, over what stands there; - is standard output."""
 FOLDER: Final = FileType(_later, is_written=True)

@@ -15,7 +15,7 @@ from firable.cli import text
 from firable.cli.evidence_files import is_evidence
 from firable.cli.files import CATALOGUE, READ
 from firable.cli.net_files import is_schema, schema_told, write_net
-from firable.cli.options import catalogue_file, load_net, write_folder
+from firable.cli.options import catalogue_file, load_found, write_folder
 from firable.cli.report import Report
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def loop_report(
     from firable.analysis.loop.verdicts import check_loop
     from firable.nets.verdict import held_to
 
-    loaded, model = load_net(argument), read_machines(machines)
+    loaded, model = load_found(argument), read_machines(machines)
     with loaded.placing():
         report = check_loop(loaded.net, model, allowed)
     faults = ask_faults(report.asked, model, allowed)

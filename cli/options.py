@@ -141,12 +141,9 @@ def load_net(argument: str) -> Loaded:
     holds. Raises `InputError` as the readers do.
     """
     from firable.nets.catalogue import catalogue_names, family_net
-    from firable.nets.diagnostics import Diagnostic, InputError
     from firable.nets.loading import Loaded, load
 
     if not argument.startswith(CATALOGUE):
-        if is_folder(argument) and next(nets_below(argument), None) is None:
-            raise InputError([Diagnostic("F1001", f"no net file is in {argument}", _NO_NETS)])
         return load(argument)
     name = argument.removeprefix(CATALOGUE)
     if name in catalogue_names():
@@ -159,6 +156,18 @@ def load_net(argument: str) -> Loaded:
         raise click.UsageError(_not_in_catalogue(name)) from None
     except ValueError as error:
         raise click.UsageError(str(error)) from None
+
+
+def load_found(argument: str) -> Loaded:
+    """The net of an argument that `net_files` has found, or has left as it is; raises `InputError` as `load_net` does.
+
+    A folder that was left has no net file below it, or is too large to be searched.
+    """
+    from firable.nets.diagnostics import Diagnostic, InputError
+
+    if is_folder(argument) and not nets_below(argument):
+        raise InputError([Diagnostic("F1001", f"no net file is in {argument}", _NO_NETS)])
+    return load_net(argument)
 
 
 def catalogue_file(argument: str, kind: str) -> Path:

@@ -111,6 +111,58 @@ def test_a_folder_without_nets_is_refused(project: Path, capsys: pytest.CaptureF
     assert "cells:1:1: error[F1001]: this is a directory\n  hint: name a file in it" in capsys.readouterr().err
 
 
+def test_a_folder_with_more_folders_below_it_than_a_project_has_is_refused(
+    project: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folders = [project, project / "cells", project / "cells/late"]
+    monkeypatch.setattr("firable.cli.files.FOLDERS_MAX", len(folders))
+    assert main(["check", "."]) == 0
+    monkeypatch.setattr("firable.cli.files.FOLDERS_MAX", len(folders) - 1)
+    capsys.readouterr()
+    for more in ((), ("--machines", "catalogue:one_robot"), ("--write", "json", "report.json")):
+        assert main(["check", ".", *more]) == 2
+        told = capsys.readouterr().err
+        assert "error[F1001]: .: more than 2 folders are below it, and are not searched for nets\n" in told
+        assert "hint: name the folder of a project, or net files" in told
+    assert main(["check", "cells/late", ".", "--format", "json"]) == 2
+    document = json.loads(capsys.readouterr().out)
+    assert [one["input"] for one in document["reports"]] == ["cells/late/late.firable.yaml"]
+    assert [one["code"] for one in document["errors"]] == ["F1001"]
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("bundle", "-o", "x.bundle"),
+        ("convert", "-o", "x.pnml"),
+        ("draw",),
+        ("draw", "-o", "x.svg"),
+        ("prove", "--write", "json", "x.json"),
+        ("refine", "-o", "x.firable.yaml"),
+        ("rehearse",),
+        ("replay", "-o", "x.trace", "--net", "catalogue:one_robot"),
+        ("run", "--trace", "x.trace"),
+        ("sim", "--modbus"),
+        ("split", "-o", "x.firable.yaml", "--suggest", "2"),
+        ("timeline", "-o", "x.svg", "--net", "catalogue:one_robot"),
+        ("verify", "--write", "json", "x.json"),
+        ("view", "--no-browser"),
+    ],
+    ids=" ".join,
+)
+def test_a_folder_is_searched_by_check_alone_and_refused_by_others_at_once(
+    command: tuple[str, ...], project: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def walk(*_: object, **__: object) -> None:
+        raise AssertionError("the folder is searched")
+
+    (project / "other").mkdir()
+    monkeypatch.setattr(os, "walk", walk)
+    for folder in ("cells", "other"):
+        assert main([command[0], folder, *command[1:]]) == 2
+        assert f"{folder}:1:1: error[F1001]: this is a directory\n  hint: name a file in it" in capsys.readouterr().err
+
+
 def test_a_folder_that_may_not_be_looked_into_is_told_and_the_others_are_checked(
     project: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -163,6 +215,8 @@ def test_all_nets_of_a_project_are_checked_and_none_that_is_installed_there(
     (project / "env/lib").mkdir(parents=True)
     (project / "env/pyvenv.cfg").touch()
     (project / "env/lib/broken.firable.yaml").write_text("firable: 2\n", "utf-8")
+    (project / "web/node_modules/cells").mkdir(parents=True)
+    (project / "web/node_modules/cells/broken.firable.yaml").write_text("firable: 2\n", "utf-8")
     assert main(["check", ".", "--format", "json"]) == 0
     reports = json.loads(capsys.readouterr().out)["reports"]
     assert [one["input"] for one in reports] == [
