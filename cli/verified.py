@@ -56,8 +56,8 @@ class Answer:
         return sign, "shown: violated", colour
 
 
-def show(report: Report) -> None:
-    """Print a report of `firable verify`."""
+def show(report: Report, *, smt_dir: str | None) -> None:
+    """Print a report of `firable verify`, and what became of the obligations that were to be written."""
     answers = [Answer(*pair) for pair in zip(report.verdicts, report.claims, strict=True)]
     text.heading(report.net, report.input)
     if report.bundle:
@@ -68,6 +68,8 @@ def show(report: Report) -> None:
     click.echo(f"\n{summary(answers)}")
     if report.files:
         click.echo(f"\n  {len(report.files)} SMT-LIB 2 files in {Path(report.files[0]).parent}")
+    elif smt_dir is not None:
+        click.echo("\n  no SMT-LIB 2 files: nothing here is shown by obligations")
 
 
 def _show_answers(report: Report, answers: Sequence[Answer]) -> None:

@@ -14,7 +14,7 @@ import click
 from firable.cli.choice import OneOf
 from firable.cli.files import FOLDER, READ
 from firable.cli.finite import FiniteRange
-from firable.cli.options import answer_all, formats_option, load_net, refuse_a_net, write_folder
+from firable.cli.options import answer_all, formats_option, is_given, load_net, refuse_a_net, write_folder
 from firable.cli.progress import stages
 from firable.cli.report import Report
 from firable.cli.sign import trust_option
@@ -78,10 +78,12 @@ def verify(
     net = None if of is None else load_net(of).net
     many = len(evidence) > 1
     asked = _Asked(net, solver, smt_dir, milliseconds, many=many, trust=trust)
+    if is_given("solver") and not any(map(_is_bundle, evidence)):
+        raise click.UsageError("--solver is for bundles: of documents z3 decides what invariants claim, and only that")
     if trust and not all(map(_is_bundle, evidence)):
         raise click.UsageError("--trust is for bundles: documents of evidence are not signed, and need not be")
     makers = [partial(_of_bundle if _is_bundle(file) else _report, file, asked) for file in evidence]
-    return answer_all("verify", format_, makers, show)
+    return answer_all("verify", format_, makers, partial(show, smt_dir=smt_dir))
 
 
 @dataclass(frozen=True)
@@ -101,7 +103,7 @@ class _Asked:
 
         if self.smt_dir is None:
             return ()
-        folder = str(Path(self.smt_dir) / file_stem(Path(file).stem)) if self.many else self.smt_dir
+        folder = str(Path(self.smt_dir) / file_stem(file)) if self.many else self.smt_dir
         return write_folder(folder, texts)
 
 

@@ -12,7 +12,7 @@ from support.evidence import document
 from support.pigeons import pigeon_evidence
 from support.second_solver import by_cvc5
 
-from firable.analysis.evidence.certificate import Labelling
+from firable.analysis.evidence.certificate import FiringSequence, Labelling
 from firable.analysis.evidence.checking.obligation import Evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.analysis.evidence.document import Document, Record, seal
@@ -23,7 +23,7 @@ from firable.analysis.spaces.reachability import explore
 from firable.cli.main import main
 from firable.nets.catalogue import catalogue_net
 from firable.nets.catalogue.families import family_net
-from firable.nets.formula import Deadlock
+from firable.nets.formula import Deadlock, Start
 from firable.semantics.trace import Discipline
 
 
@@ -89,6 +89,44 @@ def test_evidence_that_takes_too_long_is_unknown(tmp_path: Path) -> None:
     path = tmp_path / "pigeons.evidence.json"
     path.write_text(document(pigeon_evidence()).to_text())
     assert main(["verify", str(path), "--timeout", "0.001"]) == 3
+
+
+def test_the_obligations_of_several_inputs_of_one_name_are_all_written(
+    invariant: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = tmp_path / "other"
+    assert main(["check", "catalogue:machines-2", "--method", "structure", "--evidence", str(other)]) == 0
+    (found,) = other.iterdir()
+    found.rename(other / invariant.name)
+    monkeypatch.chdir(tmp_path)
+    both = str(invariant), str(other / invariant.name)
+    assert main(["verify", *both, "--smt-dir", "all"]) == 0
+    written = {}
+    for number, one in enumerate(both):
+        assert main(["verify", one, "--smt-dir", str(number)]) == 0
+        written[one] = {file.name: file.read_text() for file in Path(str(number)).iterdir()}
+    folders = sorted(Path("all").iterdir())
+    assert len(folders) == 2
+    for folder in folders:
+        assert {file.name: file.read_text() for file in folder.iterdir()} in written.values()
+    assert written[both[0]] != written[both[1]]
+
+
+def test_it_is_told_that_there_are_no_obligations_to_be_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = tmp_path / "here.evidence.json"
+    claim = Claim(ClaimKind.REACHABLE, Start())
+    found = Evidence(catalogue_net("one_robot"), Discipline.INTERLEAVING, claim, FiringSequence(()))
+    run.write_text(document(found).to_text())
+    assert main(["verify", str(run), "--smt-dir", str(tmp_path / "smt")]) == 0
+    assert "\n  no SMT-LIB 2 files: nothing here is shown by obligations\n" in capsys.readouterr().out
+
+
+def test_a_solver_is_asked_of_bundles_alone(invariant: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for solver in ("z3", "cvc5"):
+        assert main(["verify", str(invariant), "--solver", solver]) == 2
+        assert "--solver is for bundles" in capsys.readouterr().err
 
 
 def test_the_worst_of_several_documents_decides(invariant: Path, tmp_path: Path) -> None:
