@@ -159,6 +159,8 @@ FOLDER: Final = FileType(_later, is_written=True)
 """A folder that files are written into, whose names are known later."""
 JOURNAL: Final = FileType(journal_files, is_written=True)
 """The journal of a run, with what stands beside it."""
+OLD_JOURNAL: Final = FileType(journal_files, is_written=False)
+"""Such a journal that is read alone."""
 MADE: Final = FileType(_later, is_written=True)
 """A file that is written only where no other stands, as whoever makes it sees to."""
 

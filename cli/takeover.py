@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from firable.cli.files import JOURNAL, READ
+from firable.cli.files import JOURNAL, OLD_JOURNAL, READ, journal_files
 from firable.cli.options import analysis_options, budget, refuse_a_net
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ _ASKED = "taken-over"
     "--journal",
     "journals",
     metavar="FILE",
-    type=READ,
+    type=OLD_JOURNAL,
     multiple=True,
     required=True,
     help="The journal of the run of OLD, which has stopped; of each of its hosts, where there are several.",
@@ -237,19 +237,23 @@ def _refuse_missing(journals: Sequence[str]) -> None:
 
 
 def _refuse_standing(into: Sequence[str]) -> None:
+    """Raise `InputError` F1017 where a journal would take the place of another, or of what another has left.
+
+    SQLite would take a log for the end of the new journal, and a run the cell for its own; and the file that tells of a
+    journal that was lost would be lost, too.
+    """
     from firable.nets.diagnostics import Diagnostic, InputError
     from firable.nets.source import printable
     from firable.nets.writing import stands
 
     for file in into:
-        message = f"{printable(file)}: a file stands there, and may be the journal of a cell"
-        hint = "name another file"
-        if stands(f"{file}-wal"):  # SQLite would take it for the end of the new one
-            message = f"{printable(file)}-wal: what an earlier journal of that name has left stands there"
+        if stands(file):
+            message = f"{printable(file)}: a file stands there, and may be the journal of a cell"
+            raise InputError([Diagnostic("F1017", message, "name another file")])
+        for left in filter(stands, journal_files(file)):
+            message = f"{printable(left)}: what an earlier journal of that name has left stands there"
             hint = "name another file, or remove that one with its journal"
-        elif not stands(file):
-            continue
-        raise InputError([Diagnostic("F1017", message, hint)])
+            raise InputError([Diagnostic("F1017", message, hint)])
 
 
 def _is_twice(file: str, files: Sequence[str]) -> bool:

@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 import pytest
 
-from firable.cli.files import FOLDER, JOURNAL, MADE, NETS, READ, WRITTEN, FileType
+from firable.cli.files import FOLDER, JOURNAL, MADE, NETS, OLD_JOURNAL, READ, WRITTEN, FileType
 from firable.cli.main import COMMANDS, firable, main
 from firable.nets.catalogue import catalogue_path
 
@@ -75,7 +75,7 @@ def pairs() -> Iterator[tuple[str, str, str]]:
     """Each command with an output and with what it reads or writes besides; twice the same where it is repeatable."""
     for name, command in commands():
         written = [one for one in command.params if {WRITTEN, JOURNAL} & {*types_of(one)}]
-        files = [one for one in command.params if {WRITTEN, JOURNAL, READ, NETS} & {*types_of(one)}]
+        files = [one for one in command.params if {WRITTEN, JOURNAL, READ, NETS, OLD_JOURNAL} & {*types_of(one)}]
         for output in written:
             for other in files:
                 if other is not output or output.multiple:

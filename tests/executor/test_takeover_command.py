@@ -85,8 +85,28 @@ def test_files_that_stand_in_the_way_or_are_missing_are_told_of(
     assert "F1017" in capsys.readouterr().err
     assert into.read_text() == "precious"
     into.unlink()
+    for end in (".cell", ".generation", "-journal"):
+        left = Path(f"{into}{end}")
+        left.write_text("precious")
+        assert main(["takeover", str(old), str(new), "--journal", str(before), "--into", str(into)]) == 2
+        assert f"error[F1017]: {left}: what an earlier journal of that name has left" in capsys.readouterr().err
+        assert left.read_text() == "precious"
+        left.unlink()
+    assert not into.exists()
     assert main(["takeover", str(new), str(old), "--journal", str(before), "--into", str(into)]) == 2
     assert "F5031" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("end", ["", ".cell", ".generation", "-wal"])
+def test_no_journal_is_written_where_something_of_the_old_one_belongs(
+    end: str, bundles: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = journal(tmp_path / "old.journal", bundles[0], {"robot.free", "table.empty"})
+    stood = sorted(tmp_path.iterdir())
+    command = ["takeover", *map(str, bundles), "--journal", str(before), "--into", f"{before}{end}"]
+    assert main(command) == 2
+    assert f"error[F1017]: {before}{end}: --into would overwrite what the command reads" in capsys.readouterr().err
+    assert sorted(tmp_path.iterdir()) == stood
 
 
 def test_nobody_runs_the_old_bundle_on_while_it_is_taken_over(
