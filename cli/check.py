@@ -163,7 +163,8 @@ def check(
         closed = []
         for net in nets:
             folder = None if evidence_dir is None else _folder(evidence_dir, net, many=many)
-            closed.append(with_page(partial(loop_report, net, machines, allowed, loop_file, folder), page))
+            make = partial(loop_report, net, machines, allowed, loop_file, folder, progress=progress)
+            closed.append(with_page(make, page))
         return answer_all("check", format_, closed, partial(show_loop, verbose=verbose))
     if loop_file is not None:
         raise click.UsageError("--loop-net goes with --machines")

@@ -16,6 +16,7 @@ from firable.cli.evidence_files import is_evidence
 from firable.cli.files import CATALOGUE, READ
 from firable.cli.net_files import is_schema, schema_told, write_net
 from firable.cli.options import catalogue_file, load_found, write_folder
+from firable.cli.progress import progress_line
 from firable.cli.report import Report
 
 if TYPE_CHECKING:
@@ -67,18 +68,28 @@ def _plant_file(argument: str) -> Path | str:
 
 
 def loop_report(
-    argument: str, machines: str, allowed: Budget, loop_file: str | None, evidence_dir: str | None
+    argument: str,
+    machines: str,
+    allowed: Budget,
+    loop_file: str | None,
+    evidence_dir: str | None,
+    *,
+    progress: bool | None,
 ) -> Report:
-    """The report on one net with its machines; the evidence on each of its loops goes into a folder."""
+    """The report on one net with its machines; the evidence on each of its loops goes into a folder.
+
+    How far exploring is, is told as `progress_line` does.
+    """
     from firable.analysis.cures.finding import with_circle
     from firable.analysis.loop.faults import ask_faults
     from firable.analysis.loop.verdicts import check_loop
     from firable.nets.verdict import held_to
 
     loaded, model = load_found(argument), read_machines(machines)
-    with loaded.placing():
-        report = check_loop(loaded.net, model, allowed)
-    faults = ask_faults(report.asked, model, allowed)
+    with progress_line(progress) as line:
+        with loaded.placing():
+            report = check_loop(loaded.net, model, allowed, progress=line)
+        faults = ask_faults(report.asked, model, allowed, progress=line)
     files: tuple[str, ...] = ()
     if loop_file is not None:
         files = write_net(loop_file, report.closed.net)

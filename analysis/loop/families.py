@@ -11,7 +11,7 @@ moves any more, neither cell nor machines.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
@@ -131,11 +131,17 @@ class Answered:
         return evidence_of_report(replace(self.report, verdicts=verdicts), (), limits)
 
 
-def answers(loop: ClosedLoop, families: Iterable[Family], budget: Budget | None = None) -> Answered:
+def answers(
+    loop: ClosedLoop,
+    families: Iterable[Family],
+    budget: Budget | None = None,
+    *,
+    progress: Callable[[int, int], object] | None = None,
+) -> Answered:
     """Ask each family of a loop; raises `InputError` as `check` does."""
     families = tuple(families)
     properties = tuple(prop for family in families for prop in family.of.values())
-    report = check(replace(loop.net, properties=properties), budget=budget)
+    report = check(replace(loop.net, properties=properties), budget=budget, progress=progress)
     found = {verdict.name.removeprefix("property."): verdict for verdict in report.verdicts}
     joined = (_joined(loop, family, {of: found[p.name] for of, p in family.of.items()}) for family in families)
     return Answered(loop, families, tuple(joined), report)

@@ -14,7 +14,7 @@ takes, nor of a machine that forgets its command: that is another plant, in whic
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 from firable.analysis.loop.families import Answered, Family, answers, fires, never, possible
@@ -74,7 +74,12 @@ def check_faults(report: LoopReport, model: PlantModel, budget: Budget | None = 
 
 
 def ask_faults(
-    asked: Answered, model: PlantModel, budget: Budget | None = None, live: tuple[str, ...] | None = None
+    asked: Answered,
+    model: PlantModel,
+    budget: Budget | None = None,
+    live: tuple[str, ...] | None = None,
+    *,
+    progress: Callable[[int, int], object] | None = None,
 ) -> FaultsAsked:
     """Ask what the faults that the plant file declares do to a cell; `asked` are the answers without faults.
 
@@ -86,8 +91,8 @@ def ask_faults(
     recoveries = [_recovery(repaired, machine, live) for machine in repaired.failed] if live else []
     return FaultsAsked(
         live,
-        answers(for_good, _for_good(for_good, live), budget) if for_good.failed else None,
-        answers(repaired, recoveries, budget) if recoveries else None,
+        answers(for_good, _for_good(for_good, live), budget, progress=progress) if for_good.failed else None,
+        answers(repaired, recoveries, budget, progress=progress) if recoveries else None,
     )
 
 

@@ -18,7 +18,7 @@ quick. An accident ends a run, so the others are asked of runs without one.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, fields, is_dataclass, replace
 from itertools import combinations
 from typing import Final
@@ -105,7 +105,13 @@ class LoopReport:
         raise KeyError(name)
 
 
-def check_loop(net: Net, model: PlantModel, budget: Budget | None = None) -> LoopReport:
+def check_loop(
+    net: Net,
+    model: PlantModel,
+    budget: Budget | None = None,
+    *,
+    progress: Callable[[int, int], object] | None = None,
+) -> LoopReport:
     """Decide every verdict on a net with the machines of a plant, and compare it with gates free.
 
     Raises `InputError` as `close` does, and as `check` does.
@@ -115,21 +121,27 @@ def check_loop(net: Net, model: PlantModel, budget: Budget | None = None) -> Loo
     >>> report.closed.figures.markings, str(report.status), any(one.differs for one in report.differences)
     (746, 'proved', False)
     """
-    asked = ask_loop(net, model, budget)
+    asked = ask_loop(net, model, budget, progress=progress)
     unclear = (_not_asked(of) for of in net.properties if _unclear(model, of))
     verdicts = (*asked.verdicts, *unclear)
-    opened = check(net, budget=budget)
+    opened = check(net, budget=budget, progress=progress)
     return LoopReport(asked, verdicts, tuple(_differences(verdicts, opened)), opened)
 
 
-def ask_loop(net: Net, model: PlantModel, budget: Budget | None = None) -> Answered:
+def ask_loop(
+    net: Net,
+    model: PlantModel,
+    budget: Budget | None = None,
+    *,
+    progress: Callable[[int, int], object] | None = None,
+) -> Answered:
     """Ask everything of a net with the machines of a plant, but for properties of which the answer would be empty.
 
     Raises `InputError` as `close` does, and as `check` does.
     """
     loop = close(net, model)
     of_the_file = (_family_of(loop, of) for of in net.properties if not _unclear(model, of))
-    return answers(loop, (*_families(loop), *of_the_file), budget)
+    return answers(loop, (*_families(loop), *of_the_file), budget, progress=progress)
 
 
 def live_in(asked: Answered) -> tuple[str, ...]:

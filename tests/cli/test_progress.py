@@ -2,10 +2,14 @@
 
 import io
 import re
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+import firable.analysis.check
+from firable.analysis.spaces import reachability
 from firable.cli.main import main
 from firable.cli.progress import ProgressLine, Stages, progress_line, stages
 
@@ -75,6 +79,33 @@ def test_a_long_check_tells_how_far_it_is_and_the_report_is_the_same(
     assert "markings, " in told.err
     assert "edges, 0 s" in told.err or " s\n" in told.err
     assert main([*arguments, "--no-progress"]) == 1
+    silent = capsys.readouterr()
+    assert (silent.out, silent.err) == (told.out, "")
+
+
+def test_a_check_with_machines_tells_how_far_it_is_too(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("firable.cli.progress.SILENT_SECONDS", 0.0)
+    monkeypatch.setattr("firable.cli.progress.EVERY_SECONDS", 0.0)
+    explored: list[int] = []
+    explored_by = reachability.explore
+
+    def explore(
+        *arguments: Any, progress: Callable[[int, int], object] | None = None, **options: Any
+    ) -> reachability.ReachabilityGraph:
+        explored.append(len(explored))
+        if progress is not None:
+            progress(explored[-1], 0)
+        return explored_by(*arguments, progress=progress, **options)
+
+    monkeypatch.setattr(firable.analysis.check, "explore", explore)
+    cell = "catalogue:one_robot"
+    assert main(["check", cell, "--machines", cell, "--progress"]) == 0
+    told = capsys.readouterr()
+    assert re.findall(r"(\d+) markings, 0 edges", told.err) == [str(n) for n in explored]
+    assert len(explored) == 4, "the loop, the net with gates free, and the loop with faults for good and repaired"
+    assert main(["check", cell, "--machines", cell, "--no-progress"]) == 0
     silent = capsys.readouterr()
     assert (silent.out, silent.err) == (told.out, "")
 
