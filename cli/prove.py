@@ -39,7 +39,7 @@ SIGNS: Final = {"violated": ("✗", "red"), "unknown": ("?", "yellow"), "proved"
     default=60.0,
     show_default=True,
     metavar="SECONDS",
-    help="Give up an obligation after so much time, and each exploration of the protocol.",
+    help="Give up an obligation after so much time, and each exploration of the protocol or of --machines.",
 )
 @machines_option
 @protocol_options
@@ -105,9 +105,10 @@ def _report(
     verdicts = (*found.verdicts, *side_conditions(decomposition))
     loop, evidence = None, dict[str, str | bytes](found.files)
     if machines is not None:
+        from firable.analysis.spaces.reachability import Budget
         from firable.decompose.proofs.held_gates import held_gates
 
-        held = held_gates(decomposition, read_machines(machines))
+        held = held_gates(decomposition, read_machines(machines), Budget(seconds=timeout))
         loop = held.loop
         verdicts += held.verdicts
         if smt_dir is not None:

@@ -9,8 +9,12 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from firable.analysis.spaces.reachability import Budget
 from firable.cli.main import main
+from firable.decompose.proofs.held_gates import HeldGates, held_gates
 from firable.nets.catalogue import catalogue_path
+from firable.nets.decomposition import Decomposition
+from firable.nets.machines.plant_file import PlantModel
 
 SCHEMA = json.loads(files("firable.cli").joinpath("report.schema.json").read_text(encoding="utf-8"))
 CELL, PLANT = "catalogue:one_robot", "catalogue:one_robot"
@@ -164,6 +168,18 @@ def test_a_bundle_that_the_machines_forbid_ends_with_a_report_of_what_is_violate
     assert "no bundle was made" in told.out
     assert told.err == ""
     assert not bundle.exists()
+
+
+def test_the_time_of_an_obligation_is_that_of_the_loop_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    budgets: list[Budget | None] = []
+
+    def asked(decomposition: Decomposition, model: PlantModel, budget: Budget | None = None) -> HeldGates:
+        budgets.append(budget)
+        return held_gates(decomposition, model, budget)
+
+    monkeypatch.setattr("firable.decompose.proofs.held_gates.held_gates", asked)
+    assert main(["prove", CELL, "--machines", PLANT, "--timeout", "77"]) == 0
+    assert budgets == [Budget(seconds=77.0)]
 
 
 def test_prove_asks_the_assumptions_of_the_machines(capsys: pytest.CaptureFixture[str]) -> None:
