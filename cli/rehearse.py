@@ -160,7 +160,8 @@ def _campaign(argument: str, runs: Sequence[Run], jobs: int) -> Campaign:
     """What the runs come to; or those until Ctrl-C, or until enough of them have failed."""
     from firable.executor.simulation.campaign import Campaign
 
-    chunks = [runs[i : i + _CHUNK] for i in range(0, len(runs), _CHUNK)]
+    size = min(_CHUNK, -(-len(runs) // jobs))  # of a few runs too each process gets some
+    chunks = [runs[i : i + size] for i in range(0, len(runs), size)]
     done = Campaign()
     if jobs > 1:
         _share(argument, chunks, jobs, done)

@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib.resources import files
 from multiprocessing import active_children
@@ -14,12 +15,13 @@ import jsonschema
 import pytest
 from support.waiting import until
 
+import firable.cli.rehearse
 import firable.executor.simulation.campaign
 from firable.analysis.check import check
 from firable.cli.main import main
 from firable.cli.rehearse import _subjects
 from firable.decompose.bundling import make_bundle
-from firable.executor.simulation.campaign import Failed, Passed, Run
+from firable.executor.simulation.campaign import Campaign, Failed, Passed, Run
 from firable.executor.simulation.judge import Subject
 from firable.executor.simulation.world import Machines
 from firable.nets.bundle import write_bundle
@@ -50,6 +52,19 @@ def test_the_report_is_of_the_schema_and_holds_no_measured_time(capsys: pytest.C
     document = json.loads(documents[0])
     jsonschema.validate(document, SCHEMA)
     assert document["reports"][0]["run"]["runs"] == 60
+
+
+def test_a_few_runs_are_shared_by_all_processes(monkeypatch: pytest.MonkeyPatch) -> None:
+    shared: list[list[int]] = []
+
+    def share(_: str, chunks: Sequence[Sequence[Run]], __: int, ___: Campaign) -> None:
+        shared.append([len(chunk) for chunk in chunks])
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(firable.cli.rehearse, "_share", share)
+    for seeds, jobs in (("7", "3"), ("2", "8"), ("120", "2")):
+        assert main(["rehearse", "catalogue:one_robot", "--seeds", seeds, "--jobs", jobs]) == 3
+    assert shared == [[3, 3, 1], [1, 1], [50, 50, 20]]
 
 
 @pytest.mark.parametrize("before", [0, 7])
