@@ -107,13 +107,18 @@ def net_picture(
 
 
 def refuse_unknown(net: Net, collapse: tuple[str, ...]) -> None:
-    """Refuse to collapse what the net does not have."""
-    names = {"all", *net.place_index, *(controller.name for controller in net.controllers)}
+    """Refuse to collapse what the net does not have, and what is not drawn otherwise then."""
+    from firable.nets.drawing.folding import ALL, fold
+
+    names = {ALL, *net.place_index, *(controller.name for controller in net.controllers)}
     if unknown := [name for name in collapse if name not in names]:
         from firable.nets.diagnostics import with_meant
 
         message = f"the net has no place and no controller '{unknown[0]}'"
         raise click.UsageError(with_meant(message, unknown[0], sorted(names)))
+    if idle := [name for name in collapse if name != ALL and not fold(net, [name]).members]:
+        message = f"--collapse {idle[0]}: no task of two places or more is named so, and nothing is drawn otherwise"
+        raise click.UsageError(f"{message}; a task is what a controller does between being idle and being idle again")
 
 
 def _layouter(name: str) -> Layouter:

@@ -144,6 +144,11 @@ def test_what_is_no_net_file_is_refused_at_once(tmp_path: Path, capsys: pytest.C
         (["draw", "catalogue:one_robot", "-o", "net"], "'net' is not named like one: name a file *.svg"),
         (["draw", "catalogue:one_robot", "--collapse", "robt"], "no place and no controller 'robt'"),
         (["draw", "catalogue:one_robot", "--what", "graph", "--keep-layout"], "--keep-layout is of --what net"),
+        (
+            ["draw", "catalogue:one_robot", "--collapse", "robot", "--collapse", "robot.free"],
+            "--collapse robot.free: no",
+        ),
+        (["view", "catalogue:one_robot", "--collapse", "robot.free"], "no task of two places or more is named so"),
         (["refine", "catalogue:conceptual_one_robot", "-o", "-"], "cannot go to standard output"),
         (["convert", "catalogue:one_robot", "-o", "net.docx"], "cannot tell the format"),
         (["schema", "everything"], "is not one of"),
@@ -184,6 +189,13 @@ def test_an_empty_name_is_refused_and_never_the_folder_that_the_command_runs_in(
     assert f"Error: Invalid value for '{named}'" in said
     assert said.endswith(": it is empty\n")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_all_tasks_of_a_net_without_any_are_no_mistake(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["draw", "catalogue:machines-2", "--collapse", "all"]) == 0
+    folded = capsys.readouterr().out
+    assert main(["draw", "catalogue:machines-2"]) == 0
+    assert capsys.readouterr().out == folded
 
 
 def test_a_marking_without_a_token_is_no_empty_name(capsys: pytest.CaptureFixture[str]) -> None:
