@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from firable.nets.net import Net
 
 _PRESSED_SECONDS = 1.0
+_NO_BUTTON = "; over MQTT there is none: serve some machines by another protocol as well"
 
 
 @click.command(short_help="Serve the simulated cell over real protocols.")
@@ -91,6 +92,8 @@ def sim(
     disturbances = _disturbances(model, stuck, drop, hang)
     chosen = {"modbus": modbus, "opcua": opcua, "mqtt": mqtt, "serial": serial}
     protocols = [name for name, is_chosen in chosen.items() if is_chosen]
+    if protocols and bind == "-":
+        raise click.UsageError("the binding cannot go to standard output, where it is told what happens: name a file")
     if not protocols and bind is None:
         raise click.UsageError("name protocols, such as --modbus --opcua, or a binding to serve, with --bind")
 
@@ -99,6 +102,9 @@ def sim(
             binding, ends, write = await _bound(loaded, protocols, bind, model)
             if problems := binding_misfits(binding, loaded):
                 raise InputError(problems)
+            if press is not None and not binding.document.emergency_stop:
+                more = _NO_BUTTON if protocols else ""
+                raise click.UsageError(f"--press: the binding has no contact of an emergency stop{more}")
             cell = Plant(model, workpieces=workpieces, seed=seed, disturbances=disturbances)
             return await _serve(binding, loaded, cell, ends, write, speed, press, seconds)
 

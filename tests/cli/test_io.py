@@ -232,12 +232,23 @@ def test_commands_of_a_device_that_was_never_reached_are_counted_as_issued_and_n
         (["sim", "catalogue:one_robot", "--modbus", "--drop", "MC.CLAMP#2"], "nothing is held when 'MC.CLAMP' ends"),
         (["sim", "catalogue:one_robot", "--modbus", "--hang", "R.MOVE#0"], "'R.MOVE#0' never comes"),
         (["sim", "catalogue:philosophers-3", "--modbus"], "say with --plant which cell to serve"),
+        (
+            ["sim", "catalogue:one_robot", "--mqtt", "--press", "1"],
+            "--press: the binding has no contact of an emergency",
+        ),
+        (["sim", "catalogue:one_robot", "--modbus", "--bind", "-"], "the binding cannot go to standard output"),
     ],
 )
 def test_mistakes_of_who_serves_a_cell_are_told(
-    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+    arguments: list[str],
+    message: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.chdir(tmp_path)
     assert main(arguments) == 2
+    assert list(tmp_path.iterdir()) == []
     assert message in capsys.readouterr().err
 
 
