@@ -170,6 +170,11 @@ def run_host_of(
     from firable.executor.operating.hosting import machines_of, run_host
 
     machines = machines_of(bundle.net, options.controller, coordinator=options.coordinator)
+    if options.coordinator and (named := bundle.net.coordinator) is not None and named.name not in machines:
+        raise click.UsageError(
+            f"--coordinator is of a net that names none, and in '{bundle.net.name}' '{named.name}' is the one: "
+            f"it runs where --controller {named.name} does"
+        )
     driver = _drivers(bundle, machines, options)
     link, warnings = _link(bundle, machines, options)
     for warning in warnings:

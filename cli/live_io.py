@@ -67,10 +67,14 @@ def live_io(
     from firable.executor.drivers.binding import read_binding
     from firable.nets.diagnostics import InputError
 
+    if once and seconds is not None:
+        raise click.UsageError("--once ends by itself when everything has been read: leave out --for")
     binding = read_binding(bind)
     if unreadable := tuple(binding.unreadable()):
         raise InputError(unreadable)
     forced = [_forced(binding, text) for text in force]
+    if both := [signal for signal, value in forced if (signal, not value) in forced]:
+        raise click.UsageError(f"'{both[0]}' is forced to 0 and to 1: name it once")
     places = _sent(binding, send, of)
     try:
         heard = _Heard() if format_ == "text" else _HeardByPrograms(bind)

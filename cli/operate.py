@@ -150,6 +150,8 @@ def operate(
 
     if token_file is None and cert is None:
         raise click.UsageError("say who you are: --token-file, or --cert")
+    if token_file is not None and cert is not None:
+        raise click.UsageError("a run asks for a token or for a certificate: leave out --token-file or --cert")
     if not address.startswith(("http://", "https://")):
         raise click.UsageError(
             f"'{address}' is no address: write it as the run has printed it, with http:// or https://"

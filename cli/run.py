@@ -140,10 +140,11 @@ def run(
             raise click.UsageError(f"--{name} is of the simulated cell, which this run has not (--bind, --controller)")
     if options.is_one_of_several and step:
         raise click.UsageError("--step is of a whole run: on one host of several, `firable operate` steps (--serve)")
-    if options.is_one_of_several and (plant is not None or watch == "stop") and options.bind is None:
+    is_watched = watch == "stop" or (watch == "tell" and is_given("watch"))
+    if options.is_one_of_several and (plant is not None or is_watched) and options.bind is None:
         raise click.UsageError("--plant and --watch are of machines: say with --bind where those of this host are")
-    if watch == "stop" and plant is None and not is_simulated:
-        raise click.UsageError("--watch stop holds the machines against a plant file: say with --plant which")
+    if is_watched and plant is None and not is_simulated:
+        raise click.UsageError(f"--watch {watch} holds the machines against a plant file: say with --plant which")
 
     def make() -> Report:
         from firable.cli.stepping import stepping
@@ -244,6 +245,8 @@ def _said(net: Net, say: tuple[str, ...]) -> dict[str, Answer]:
             raise click.UsageError(with_meant(message, place, commanding))
         if word not in SAID:
             raise click.UsageError(f"--say {option}: say {', '.join(SAID)}")
+        if said.get(place, SAID[word]) is not SAID[word]:
+            raise click.UsageError(f"--say {option}: something else is said of '{place}' too")
         said[place] = SAID[word]
     return said
 

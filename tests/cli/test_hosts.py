@@ -69,6 +69,15 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
         ["--controller", "robot", "--dry-run", "1", "--join", "tcp/[::1]:1", "--watch", "stop"],
         "say with --bind",
     ),
+    "no machines to tell of": (
+        ["--controller", "robot", "--dry-run", "1", "--join", "tcp/[::1]:1", "--watch", "tell"],
+        "say with --bind",
+    ),
+    "no model to tell by": (["--bind", "x", "--watch", "tell"], "--watch tell holds the machines against a plant file"),
+    "a coordinator that the net names": (
+        ["--controller", "robot", "--coordinator", "--dry-run", "1", "--join", "tcp/[::1]:1"],
+        "it runs where --controller system does",
+    ),
     "no model": (["--controller", "robot", "--bind", "x", "--join", "tcp/[::1]:1", "--watch", "stop"], "with --plant"),
     "no model of a whole run": (["--bind", "x", "--watch", "stop"], "with --plant"),
     "steps at the terminal": (["--controller", "robot", "--dry-run", "1", "--step"], "`firable operate` steps"),

@@ -119,6 +119,9 @@ def test_a_program_reads_signals_as_lines_of_json_of_the_published_schema(
     jsonschema.Draft202012Validator.check_schema(SCHEMA)
     assert main(["io", str(cell.bind), "--once", "--format", "json", "--force", "mc.part_present=1"]) == 0
     (line,) = shown(capsys)
+    both = ("--force", "mc.part_present=1", "--force", "mc.part_present=0")
+    assert main(["io", str(cell.bind), "--once", *both]) == 2
+    assert "'mc.part_present' is forced to 0 and to 1: name it once" in capsys.readouterr().err
     assert line["devices"] == {"modbus": {"connected": True}}
     assert (line["signals"]["mc.part_present"]["value"], line["signals"]["mc.part_present"]["quality"]) == (
         True,

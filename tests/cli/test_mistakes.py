@@ -149,6 +149,11 @@ def test_what_is_no_net_file_is_refused_at_once(tmp_path: Path, capsys: pytest.C
             "--collapse robot.free: no",
         ),
         (["view", "catalogue:one_robot", "--collapse", "robot.free"], "no task of two places or more is named so"),
+        (["io", "no.bind.yaml", "--once", "--for", "1"], "--once ends by itself when everything has been read"),
+        (
+            ["operate", "https://x", "pause", "--token-file", "t", "--cert", "c", "k"],
+            "leave out --token-file or --cert",
+        ),
         (["refine", "catalogue:conceptual_one_robot", "-o", "-"], "cannot go to standard output"),
         (["convert", "catalogue:one_robot", "-o", "net.docx"], "cannot tell the format"),
         (["schema", "everything"], "is not one of"),

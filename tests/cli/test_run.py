@@ -266,6 +266,10 @@ def test_a_trace_or_a_log_in_a_file_of_the_journal_is_refused(
         (("--say", "mc.fi=done", "--journal", "j"), "did you mean 'mc.fix'?"),
         (("--say", "x=done", "--journal", "j"), "no place 'x' sends a command\n"),
         (("--say", "mc.fix=perhaps", "--journal", "j"), "say done, working, not-received"),
+        (
+            ("--say", "mc.fix=done", "--say", "mc.fix=working", "--journal", "j"),
+            "--say mc.fix=working: something else is said of 'mc.fix' too",
+        ),
     ],
 )
 def test_a_word_on_no_command_or_of_no_run_that_is_taken_up_is_refused(
@@ -276,7 +280,9 @@ def test_a_word_on_no_command_or_of_no_run_that_is_taken_up_is_refused(
 
 
 @pytest.mark.parametrize("option", [("--workpieces", "3"), ("--seed", "1"), ("--speed", "10")], ids=lambda o: o[0])
-@pytest.mark.parametrize("real", [("--bind", "b.yaml"), ("--controller", "robot", "--dry-run", "1")], ids=lambda o: o[0])
+@pytest.mark.parametrize(
+    "real", [("--bind", "b.yaml"), ("--controller", "robot", "--dry-run", "1")], ids=lambda o: o[0]
+)
 def test_what_only_a_simulated_cell_heeds_is_refused_of_real_machines(
     option: tuple[str, str], real: tuple[str, ...], bundle: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
