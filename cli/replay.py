@@ -72,6 +72,8 @@ def replay(
         raise click.UsageError(f"'{bundle}' is a bundle and no trace: `firable replay TRACE --net {bundle}`")
     if of is None:
         raise click.UsageError("Missing option '--net': say which net, or which bundle, the trace is of")
+    if output == "-":
+        raise click.UsageError("the trace cannot go to standard output, where the report goes: name a file")
     if latency_seconds is not None and machines is None:
         raise click.UsageError("--latency is of the machines: say which with --machines")
     return answer("replay", format_, lambda: _report(traces, of, machines, latency_seconds, output), _show)

@@ -150,6 +150,7 @@ def test_what_is_no_net_file_is_refused_at_once(tmp_path: Path, capsys: pytest.C
         ),
         (["view", "catalogue:one_robot", "--collapse", "robot.free"], "no task of two places or more is named so"),
         (["io", "no.bind.yaml", "--once", "--for", "1"], "--once ends by itself when everything has been read"),
+        (["replay", "x", "--net", "y", "-o", "-"], "the trace cannot go to standard output"),
         (
             ["operate", "https://x", "pause", "--token-file", "t", "--cert", "c", "k"],
             "leave out --token-file or --cert",
