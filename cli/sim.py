@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from firable.nets.net import Net
 
 _PRESSED_SECONDS = 1.0
+_SEAL = "# Written by `firable sim`, which writes it anew unless it is edited: "
+_SEAL_CHARACTERS = 16
 _NO_BUTTON = "; over MQTT there is none: serve some machines by another protocol as well"
 
 
@@ -141,23 +144,29 @@ async def _bound(
     binding = parse_binding(text, path)
 
     def write() -> None:
-        write_text(path, text)
+        write_text(path, _sealed(text))
         click.echo(f"{path}: {', '.join(f'{name} at {port}' for name, port in ports.items())}")
 
     return binding, ends | ends_of(binding.without(set(ends))), write
 
 
+def _sealed(text: str) -> str:
+    """A binding with a line by which it is known whether somebody has edited it since."""
+    return f"{text}{_SEAL}{hashlib.sha256(text.encode()).hexdigest()[:_SEAL_CHARACTERS]}\n"
+
+
 def _refuse_what_is_not_ours(path: str) -> None:
-    """Refuse (F1017) to write over a file that was not made here: it may be the binding of a site."""
+    """Refuse (F1017) to write over a file that was not made here, or was edited: it may be the binding of a site."""
     from firable.executor.drivers.binding import SIZE_BYTES_MAX
-    from firable.executor.drivers.far_side.ends import DESCRIPTION
     from firable.nets.diagnostics import Diagnostic, InputError
     from firable.nets.source import printable, read_bytes
 
-    if path == "-" or not Path(path).is_file():  # what else may stand there is refused where it is written
+    if not Path(path).is_file():  # what else may stand there is refused where it is written
         return
-    if DESCRIPTION.encode() not in read_bytes(path, SIZE_BYTES_MAX).splitlines():
-        message = f"{printable(path)}: a file stands there that is not of firable sim, and may be the binding of a site"
+    data = read_bytes(path, SIZE_BYTES_MAX)
+    made, seal, _ = data.rpartition(_SEAL.encode())
+    if not seal or data != _sealed(made.decode(errors="replace")).encode():
+        message = f"{printable(path)}: a file stands there that firable sim has not written, or was edited since"
         hint = "name another file, or give --bind without protocols to serve what the file leads to"
         raise InputError([Diagnostic("F1017", message, hint)])
 

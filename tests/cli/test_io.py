@@ -347,4 +347,12 @@ def test_a_binding_that_is_not_of_the_simulation_is_not_written_over(
     bind.unlink()
     assert main(command) == 0
     assert main(command) == 0  # what it wrote itself it may write again
+    edited = bind.read_text().replace("read: ", "force: true, read: ")
+    assert edited != bind.read_text()
+    for text in (edited, f"{bind.read_text()}\n", f"# mine\n{bind.read_text()}"):
+        bind.write_text(text)
+        capsys.readouterr()
+        assert main(command) == 2
+        assert "a file stands there that firable sim has not written, or was edited since" in capsys.readouterr().err
+        assert bind.read_text() == text
     capsys.readouterr()
