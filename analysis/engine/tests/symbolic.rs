@@ -414,10 +414,13 @@ impl Processes {
 #[test]
 fn places_that_were_merged_for_the_search_are_told_apart_in_what_it_finds() {
     let mut numbers = Numbers(0x9e37_79b9_7f4a_7c15);
+    let mut merged = 0;
     for _ in 0..4000 * factor() {
         let naive = Processes::drawn(&mut numbers);
-        let (places, transitions, initial) = (naive.places as usize, naive.transitions.clone(), naive.initial.clone());
-        let space = watched(|watch| Symbolic::explore(places, transitions, initial, 1 << 24, None, watch));
+        let (places, transitions, initial) = (naive.places as usize, &naive.transitions, &naive.initial);
+        let space = watched(|watch| Symbolic::explore_merged(places, transitions, initial, 1 << 24, watch));
+        let Some(space) = space else { continue };
+        merged += 1;
         let mut both = Both { naive, space };
         let start: Set = [mask(&both.naive.initial)].into();
         let reach = both.naive.closure(&start, |_| true);
@@ -437,6 +440,7 @@ fn places_that_were_merged_for_the_search_are_told_apart_in_what_it_finds() {
         let found = watched(|watch| both.space.backward(&[], node, root, None, watch));
         both.check(found, &backward, "backward");
     }
+    assert!(merged > 1500 * factor(), "{merged}");
 }
 
 /// Counters that come to their end after as many steps as they have places, and beside them a ring that never does.

@@ -38,6 +38,13 @@ const RUNNER_UP: u64 = 4;
 const TWINS_APART: usize = 12;
 const ROUNDS_ALIKE: u32 = 2;
 
+/// How long a race is waited for: to its end, or until some would drop out, by when most are over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Patience {
+    Short,
+    Long,
+}
+
 /// A search in one order, which may be left and gone on with.
 struct Racer {
     order: Order,
@@ -156,15 +163,15 @@ fn drop_twins(field: &mut Vec<Racer>) {
 }
 
 impl Symbolic {
-    /// The reachable markings in the order that finds them first.
+    /// The reachable markings in the order that finds them first; None where patience ended before.
     pub(super) fn raced(
         places: usize,
-        transitions: Vec<Transition>,
-        initial: Vec<u32>,
+        (transitions, initial): (Vec<Transition>, Vec<u32>),
         bytes: usize,
         orders: Option<Vec<Order>>,
+        patience: Patience,
         watch: &mut Watch<'_>,
-    ) -> Result<Self, Stop> {
+    ) -> Result<Option<Self>, Stop> {
         let orders = match orders {
             Some(orders) => orders,
             None => candidates(places, &transitions, watch)?,
@@ -182,7 +189,7 @@ impl Symbolic {
                     Ok(Some(reach)) => {
                         if let Some(begun) = field.swap_remove(at).begun {
                             drop(field);
-                            return Ok(Self::found(begun, transitions, initial, reach, bytes));
+                            return Ok(Some(Self::found(begun, transitions, initial, reach, bytes)));
                         }
                     }
                     Ok(None) => at += 1,
@@ -198,6 +205,9 @@ impl Symbolic {
             }
             spent += fuel;
             drop_twins(&mut field);
+            if spent >= PATIENCE * first && patience == Patience::Short {
+                return Ok(None);
+            }
             if spent >= PATIENCE * first && !settled {
                 thinned += 1;
                 settled = thin_out(&mut field, thinned);
@@ -305,6 +315,27 @@ mod tests {
             assert_eq!((thin_out(&mut racers, thinned), racers.len()), (thinned == 3, left));
             let spared: Vec<&Order> = racers.iter().filter(|racer| racer.spared).map(|racer| &racer.order).collect();
             assert_eq!(spared, if thinned < 3 { vec![&along, &back] } else { vec![] });
+        }
+    }
+
+    /// Vehicles that overtake each other on a ring of zones, of which each holds one: all ways to place them.
+    fn vehicles(count: u32, zones: u32) -> (usize, Vec<Transition>, Vec<u32>) {
+        let (at, free) = (|v: u32, z: u32| v * zones + z % zones, |z: u32| count * zones + z % zones);
+        let moves = |(v, z, by)| Transition::new(&[at(v, z), free(z + by)], &[at(v, z + by), free(z)], &[], &[], &[]);
+        let all = (0..count).flat_map(|v| (0..zones).flat_map(move |z| [1, 2].map(|by| (v, z, by))));
+        let transitions = all.map(moves).collect();
+        let initial = (0..count).map(|v| at(v, v)).chain((count..zones).map(free)).collect();
+        (((count + 1) * zones) as usize, transitions, initial)
+    }
+
+    #[test]
+    fn who_has_little_patience_leaves_a_long_race_and_sees_the_end_of_a_short_one() {
+        for (count, zones, ends) in [(2, 4, true), (8, 24, false)] {
+            let (places, transitions, initial) = vehicles(count, zones);
+            let (net, mut poll) = ((transitions, initial), unwatched);
+            let watch = &mut Watch::new(None, &mut poll);
+            let found = Symbolic::raced(places, net, 1 << 30, None, Patience::Short, watch).expect("enough room");
+            assert_eq!(found.is_some(), ends);
         }
     }
 

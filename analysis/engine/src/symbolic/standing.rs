@@ -2,12 +2,17 @@
 //!
 //! The places that one place stands for have levels of their own, one after the other, where it had one. So each node of
 //! the small diagram becomes as many as it stands for places, and the diagram is larger by no more than that, whatever
-//! the number of markings that come back. What stands in what is as deep as there were rounds of merging, so the recursion
-//! over that is bounded.
+//! the number of markings that come back.
+//!
+//! An order that was found for the net itself is the better one for what is asked later, where fixed points go on round by
+//! round. So the search begins on the net itself, and goes on with the smaller one where it is not over soon.
+//!
+//! What stands in what is as deep as there were rounds of merging, so the recursion over that is bounded.
 
 use super::merging::{Merged, merged};
 use super::order::Order;
 use super::ordered::{Events, Ordered};
+use super::race::Patience;
 use super::space::Symbolic;
 use super::zdd::{EMPTY, Node, Store, UNIT};
 use crate::budget::{Stop, Watch};
@@ -62,14 +67,35 @@ impl Symbolic {
     ) -> Result<Self, Stop> {
         if orders.is_none()
             && let Some(smaller) = merged(places, &transitions, &initial, watch)?
-            && let Some(found) = Self::through(smaller, &transitions, &initial, bytes, watch)?
         {
-            return Ok(found);
+            let net = (transitions.clone(), initial.clone());
+            match Self::raced(places, net, bytes, None, Patience::Short, watch) {
+                Ok(Some(found)) => return Ok(found),
+                Ok(None) | Err(Stop::Memory) => {}
+                Err(stop) => return Err(stop),
+            }
+            if let Some(found) = Self::through(smaller, &transitions, &initial, bytes, watch)? {
+                return Ok(found);
+            }
         }
-        Self::raced(places, transitions, initial, bytes, orders, watch)
+        Self::raced(places, (transitions, initial), bytes, orders, Patience::Long, watch)?.ok_or(Stop::Memory)
     }
 
-    /// The same by way of a smaller net; None where that has contact, and so does not stand for the net.
+    /// The same by way of the smaller net alone; None where there is none, or it does not stand for the net.
+    pub fn explore_merged(
+        places: usize,
+        transitions: &[Transition],
+        initial: &[u32],
+        bytes: usize,
+        watch: &mut Watch<'_>,
+    ) -> Result<Option<Self>, Stop> {
+        match merged(places, transitions, initial, watch)? {
+            Some(smaller) => Self::through(smaller, transitions, initial, bytes, watch),
+            None => Ok(None),
+        }
+    }
+
+    /// The same by way of this smaller net; None where that has contact, and so does not stand for the net.
     fn through(
         smaller: Merged,
         transitions: &[Transition],
@@ -78,7 +104,8 @@ impl Symbolic {
         watch: &mut Watch<'_>,
     ) -> Result<Option<Self>, Stop> {
         let Merged { transitions: its, initial: begin, stands } = smaller;
-        let mut small = Self::raced(stands.len(), its, begin, bytes, None, watch)?;
+        let found = Self::raced(stands.len(), (its, begin), bytes, None, Patience::Long, watch)?;
+        let mut small = found.ok_or(Stop::Memory)?;
         let reach = small.reach;
         if small.all(&[], reach, Events::Contacts, watch)? != EMPTY {
             return Ok(None);
