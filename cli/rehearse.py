@@ -214,12 +214,13 @@ def _share(argument: str, chunks: Sequence[Sequence[Run]], jobs: int, done: Camp
     try:
         with ProcessPoolExecutor(jobs, initializer=_begin, initargs=(stopped,)) as pool:
             waiting = deque(pool.submit(_part_of_all, argument, chunk) for chunk in chunks)
-            while waiting and len(done.failed) < _FAILURES_MAX and not pressed.is_set():
-                if wait([waiting[0]], _LOOK_SECONDS).done:
-                    done.join(waiting.popleft().result())
-            if pressed.is_set():
-                stopped.set()  # what is left is one run in each process
-            pool.shutdown(cancel_futures=True)
+            try:
+                while waiting and len(done.failed) < _FAILURES_MAX and not pressed.is_set():
+                    if wait([waiting[0]], _LOOK_SECONDS).done:
+                        done.join(waiting.popleft().result())
+            finally:  # however it ended, what is left is one run in each process
+                stopped.set()
+                pool.shutdown(cancel_futures=True)
             for begun in waiting if pressed.is_set() else ():
                 if not begun.cancelled():
                     done.join(begun.result())

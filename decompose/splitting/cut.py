@@ -159,7 +159,7 @@ def _problems(net: Net) -> Iterator[Diagnostic]:
             )
     for kind, named in (("controllers", net.controllers), ("transitions", net.transitions)):
         for item in named:
-            if "/" in item.name:  # `vote/T/C` would be the vote of C on T, or what somebody has called so
+            if "/" in item.name:  # `vote/T/C` would be the vote of C on T, or a transition of that name
                 yield Diagnostic(
                     "F4001",
                     f"'{item.name}' has a '/' in its name, by which proofs part the names of what they add to the net",

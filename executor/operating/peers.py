@@ -19,8 +19,8 @@ heard later things of this very journal, it ends whoever was met: its places are
 
 *Machines that another host runs*: a host that is started by mistake beside the one that has its machines would stop
 them by the safe outputs of its start, in the middle of their work. So one that nobody has ever let in leaves them alone
-until somebody does or `MEET_SECONDS` are over; where another host has them, until it is let in, or the other is gone
-and as long is over. That another has them it says itself, where the link leads to it, or one does that has let it in.
+until somebody does or `MEET_SECONDS` are over; where another host has said that it has them, until it is let in, or the
+other was gone for `PARTED_SECONDS`; where a third one has let the other in, until it is let in itself.
 A host that comes back with its journal drives the safe outputs at once, and so does an emergency stop.
 Rejected: to leave them alone until somebody lets it in, however long. A cell is started from its machines at rest, and
 the first host of it may wait for hours for the others.
@@ -56,6 +56,8 @@ REPEAT_SECONDS: Final = 0.2
 REPEAT_SECONDS_MAX: Final = 3.2
 MEET_SECONDS: Final = 3.0
 """A peer that has not been met by then is told."""
+PARTED_SECONDS: Final = 30.0
+"""A host that is gone for so long has ended: a switch that is started anew, or a plug, parts two for less."""
 
 
 class Peers:
@@ -102,8 +104,8 @@ class Peers:
         self.meeting = asyncio.Event()
         self.turned_away: dict[str, str] = {}
         """What is said of each that was refused and has not come back as it should."""
-        self.rivals: set[tuple[str, ...]] = set()
-        """The machines of each host that is there, has some of those here too, and was refused for that."""
+        self.unfit: set[tuple[str, ...]] = set()
+        """The machines of each host that was refused and has not gone since."""
         self.elsewhere: set[str] = set()
         """The machines here that a third host has let another one in with, as it has said."""
         self.is_hands_off = False
@@ -148,13 +150,14 @@ class Peers:
 
     @property
     def claimed(self) -> tuple[str, ...]:
-        """The machines here that another host has, as far as is known."""
-        return tuple(sorted(self.here & {*self.elsewhere, *(name for rival in self.rivals for name in rival)}))
+        """The controllers here whose machines another host has, as far as is known."""
+        theirs = self.elsewhere.union(*self.unfit)
+        return tuple(sorted(theirs.intersection(self.acts.controllers)))
 
     async def let_drive(self, is_urgent: Callable[[], bool]) -> None:
         """Wait as long as another host may have the machines here, or is said to have them; not where it is urgent.
 
-        What a host that is gone had is left alone for `MEET_SECONDS` more: a broken line may have taken it away.
+        What a host that is gone had is left alone for `PARTED_SECONDS` more: a broken line may have taken it away.
         """
         loop = asyncio.get_running_loop()
         until = loop.time() + MEET_SECONDS
@@ -168,7 +171,7 @@ class Peers:
                 except TimeoutError:
                     continue
                 if claimed:
-                    until = loop.time() + MEET_SECONDS
+                    until = loop.time() + PARTED_SECONDS
         except asyncio.CancelledError:
             own = asyncio.current_task()
             if own is None or not is_urgent():
@@ -224,7 +227,7 @@ class Peers:
         if self.is_hands_off and (claimed := self.claimed):
             yield (
                 f"another host has {all_called(claimed)}: this one leaves its machines alone, and does not read their "
-                "emergency stops, until it is let in or the other is gone"
+                "emergency stops, until it is let in, or the other, where it has said so itself, is gone for long"
             )
         yield from dict.fromkeys(map(self._missing, self.never_met))
 
@@ -322,10 +325,9 @@ class Peers:
     def refused(self, peers: Sequence[str], why: Refusal) -> None:
         """A host was refused."""
         self._turn_away(peers, f"the host of {all_called(peers)} is refused: {why.problem.message}; {why.problem.hint}")
+        self.unfit.add(tuple(peers))
         if self.here.isdisjoint(peers):
             self.elsewhere |= self.here.intersection(why.run_by_two)
-        else:
-            self.rivals.add(tuple(peers))
         self.meeting.set()
         if why.are_unlike:
             self.unlike.update(peers)
@@ -335,10 +337,11 @@ class Peers:
 
     def gone(self, peers: Sequence[str]) -> None:
         """A host that was refused is gone; what it had it may have left in the middle of something."""
-        for name in peers:
+        self.unfit.discard(tuple(peers))
+        gone = set(peers).difference(*self.unfit)  # some may be those of another host that is there
+        for name in gone:
             self.turned_away.pop(name, None)
-        self.unlike.difference_update(peers)
-        self.rivals.discard(tuple(peers))
+        self.unlike -= gone
         self.told("gone", f"the host of {all_called(peers)} that was refused is gone")
         self.meeting.set()
 

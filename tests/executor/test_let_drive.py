@@ -122,8 +122,46 @@ def test_a_host_that_a_third_one_refuses_for_another_leaves_its_machines_alone(m
     asyncio.run(main())
 
 
+def test_a_coordinator_that_two_hosts_have_keeps_neither_from_its_machines(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(peers, "MEET_SECONDS", 0.1)
+
+    async def main() -> None:
+        cell = Cell(monkeypatch)
+        await cell.begin()
+        host = cell.hosts.host((*A, COORDINATOR), MemoryJournal())
+        host.driver = bound_driver(parse_binding(BINDING), SPLIT.net, SPLIT.subnet("a"))
+        cell.tasks.append(asyncio.create_task(host.main()))
+        await asyncio.sleep(0)
+        host.peers.refused(("x", COORDINATOR), run_by_two((COORDINATOR,)))
+        assert host.peers.claimed == ()
+        await until(lambda: cell.written == ["out"], "the safe outputs")
+        await cell.end_all()
+
+    asyncio.run(main())
+
+
+def test_of_two_refused_hosts_the_end_of_one_says_nothing_of_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def main() -> None:
+        cell = Cell(monkeypatch)
+        await cell.begin()
+        alone = cell.start(A)
+        await asyncio.sleep(0)
+        for names in (("a",), ("a", "b")):
+            alone.peers.refused(names, run_by_two(("a",)))
+        alone.peers.gone(("a", "b"))
+        assert list(alone.peers.claimed) == ["a"]
+        assert alone.peers.turned_away.keys() == {"a"}
+        alone.peers.gone(("a",))
+        assert list(alone.peers.claimed) == []
+        assert not alone.peers.turned_away
+        await cell.end_all()
+
+    asyncio.run(main())
+
+
 def test_machines_of_another_host_are_driven_some_time_after_that_has_gone(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(peers, "MEET_SECONDS", 0.3)
+    monkeypatch.setattr(peers, "MEET_SECONDS", 0.1)
+    monkeypatch.setattr(peers, "PARTED_SECONDS", 0.4)
 
     async def main() -> None:
         cell = Cell(monkeypatch)

@@ -1,21 +1,24 @@
 //! Places merged for the search: a smaller net, of which each marking stands for markings of the net itself.
 //!
-//! A token that may go from p to q by itself, at any time, makes two markings of each that has it. Where nothing else sees
-//! on which of them it is, one place a does for both in the search, and what each marking with a token on a stands for is
-//! put into the diagram afterwards (`Stands`). Three rules, until none applies:
+//! A token that may go from p to q by itself, at any time, makes two markings of each that has it. Where nothing else
+//! sees on which of them it is, one place a does for both in the search, and what each marking with a token on a stands
+//! for is put into the diagram afterwards (`Stands`). Three rules, until none applies:
 //!
 //! - *Rings.* Moves with one input and one output that lead from each of some places to each other: the token may be
 //!   anywhere on them, whatever else is marked.
-//! - *Chains.* All that puts a token on q, empty in M0, are moves from p that do nothing else. Where a token is on q, it
-//!   might as well be on p still, and where it is on p it may go to q. So it may be on either.
+//! - *Chains.* All that puts a token on q, empty in M0, are moves from p that do nothing else. So a token comes to q over p
+//!   alone: where it is on q it might as well be on p still, and where it is on p it may go to q.
 //! - *Copies.* The same moves fill p and q, the same ones empty them, and both are marked in M0 or neither: they are
 //!   always alike, and one does for the other.
 //!
 //! No gate reads the places of a ring or chain, and no transition takes or puts two tokens there; which of two copies is
-//! read does not matter. Nothing is said of room on the outputs, so the smaller net must come out free of *contact*. Then
-//! so is the net: a transition in contact would put a second token on a place of a. Under the ordinary rule both then have
-//! one token at most on each place, and by induction over the firings the net reaches exactly what the markings of the
-//! smaller one stand for: to fire a transition that takes the token from q, it first goes there.
+//! read does not matter. Nothing is said of room on the outputs, so the smallest net must come out free of *contact*.
+//!
+//! Why that is enough, of one merging, and so of all, from the last to the first: the smaller net does what the net does,
+//! without the moves inside of a. If it is free of contact, no two tokens ever come together on a place of it, nor on
+//! those that a stands for, and the net is free of contact, too. Then both go by the ordinary rule, and each firing of
+//! the smaller net can be made in the net, once the token is on that place of a from which it is taken. So the net
+//! reaches exactly what the markings of the smaller one stand for.
 //!
 //! Source: reduction equations (Berthomieu, Le Botlan, Dal Zilio 2018, "Petri net reductions for counting markings"), by
 //! which they count; here they bring the markings back, for all questions. Their agglomerations of more than one token
@@ -143,10 +146,11 @@ impl<'a> Draft<'a> {
                 }
             }
             // A token that is taken from one of the merged places and put on another stays where it is.
-            let stays: Vec<u32> = each.inputs.iter().copied().filter(|place| each.outputs.contains(place)).collect();
+            let stays: Vec<u32> =
+                each.inputs.iter().copied().filter(|place| each.outputs.binary_search(place).is_ok()).collect();
             if !stays.is_empty() {
-                each.inputs.retain(|place| !stays.contains(place));
-                each.outputs.retain(|place| !stays.contains(place));
+                each.inputs.retain(|place| stays.binary_search(place).is_err());
+                each.outputs.retain(|place| stays.binary_search(place).is_err());
                 each.permissive.extend(stays);
                 each.permissive.sort_unstable();
                 each.permissive.dedup();
@@ -230,7 +234,7 @@ impl<'a> Draft<'a> {
     }
 
     fn copies(&mut self) -> bool {
-        // Of a place, a number that those have in common whose moves are the same; then the moves themselves are compared.
+        // A number that places with the same moves have in common; of those that have, the moves are compared.
         let mut sums: Vec<u64> = self.marked.iter().map(|&marked| u64::from(marked)).collect();
         for (t, each) in self.moves.iter().enumerate() {
             for (side, kind) in [(&each.inputs, 2), (&each.outputs, 3)] {

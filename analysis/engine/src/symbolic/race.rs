@@ -38,7 +38,7 @@ const RUNNER_UP: u64 = 4;
 const TWINS_APART: usize = 12;
 const ROUNDS_ALIKE: u32 = 2;
 
-/// How long a race is waited for: to its end, or until some would drop out, by when most are over.
+/// How long a race is waited for: to its end, or until some would drop out, by when most are over (`standing`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Patience {
     Short,

@@ -1,11 +1,11 @@
 //! What the places of a smaller net stand for, and the markings of the net itself brought back into the diagram.
 //!
-//! The places that one place stands for have levels of their own, one after the other, where it had one. So each node of
-//! the small diagram becomes as many as it stands for places, and the diagram is larger by no more than that, whatever
-//! the number of markings that come back.
+//! The places that one place stands for have levels of their own, one after the other, where it had one. So each node
+//! of the small diagram becomes as many as it stands for places, and the diagram is larger by no more than that,
+//! whatever the number of markings that come back.
 //!
-//! An order that was found for the net itself is the better one for what is asked later, where fixed points go on round by
-//! round. So the search begins on the net itself, and goes on with the smaller one where it is not over soon.
+//! An order that was found for the net itself is the better one for what is asked later, where fixed points go on round
+//! by round. So the search begins on the net itself, and goes on with the smaller one where it is not over soon.
 //!
 //! What stands in what is as deep as there were rounds of merging, so the recursion over that is bounded.
 
@@ -74,8 +74,10 @@ impl Symbolic {
                 Ok(None) | Err(Stop::Memory) => {}
                 Err(stop) => return Err(stop),
             }
-            if let Some(found) = Self::through(smaller, &transitions, &initial, bytes, watch)? {
-                return Ok(found);
+            match Self::through(smaller, &transitions, &initial, bytes, watch) {
+                Ok(Some(found)) => return Ok(found),
+                Ok(None) | Err(Stop::Memory) => {}
+                Err(stop) => return Err(stop),
             }
         }
         Self::raced(places, (transitions, initial), bytes, orders, Patience::Long, watch)?.ok_or(Stop::Memory)
