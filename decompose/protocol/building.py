@@ -196,7 +196,7 @@ def _memory(parts: Parts, part: Part) -> tuple[str, ...]:
 
 
 def _require_distinct(parts: Parts) -> None:
-    """Refuse names that make one place of two, as those of the parts of `a/b` at `c` and of `a` at `b/c`."""
+    """Refuse names that make one place of two, as the transition `a+b` beside `a` and `b`, which compete."""
     own, part_of = [place.name for place in parts.net.places], parts.coordinated.items()
     made = [*own, *map(central, own), ASTRAY, *(down(subnet.name) for subnet in parts.decomposition.subnets)]
     made += [name(t) for t in parts.coordinated for name in (asked, committed)]
@@ -205,9 +205,7 @@ def _require_distinct(parts: Parts) -> None:
     for place, times in Counter(made).items():
         if times > 1:
             message = f"two names of the net make one place of the net of its protocol, '{place}'"
-            raise InputError(
-                [Diagnostic("F2001", message, "rename one of them; names without `/` and `+` never do so")]
-            )
+            raise InputError([Diagnostic("F2001", message, "rename one of them; names without `+` never do so")])
 
 
 def _gathered(parts: Parts) -> Iterator[Transition]:

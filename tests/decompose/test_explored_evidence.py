@@ -423,6 +423,22 @@ def test_names_that_make_one_place_of_two_are_refused() -> None:
         Transition("x", ("a/b.p", "c.q"), ("a/b.q", "c.p")),
     )
     net = Net("strokes", places, transitions, controllers=(Controller("b"), Controller("a/b"), Controller("c")))
+    with pytest.raises(InputError, match="'x/a' has a '/' in its name"):
+        built(net, NO_FAULTS)
+    with pytest.raises(NotShownError, match="two names of the net make one place"):
+        stated_anew(net, NO_FAULTS)
+
+
+def test_a_name_that_is_that_of_a_group_is_refused() -> None:
+    """Of `g` and `h`, which compete, and of `g+h` it would be decided in one place."""
+    marked = tuple(Place(f"{owner}.p", owner, marked=True) for owner in "bc")
+    places = (*marked, *(Place(f"{owner}.{name}", owner) for owner in "bc" for name in "qr"))
+    transitions = (
+        Transition("g", ("b.p", "c.p"), ("b.q", "c.q")),
+        Transition("h", ("b.p", "c.p"), ("b.r", "c.r")),
+        Transition("g+h", ("b.q", "c.q"), ("b.p", "c.p")),
+    )
+    net = Net("strokes", places, transitions, controllers=(Controller("b"), Controller("c")))
     with pytest.raises(InputError, match="two names of the net make one place of the net of its protocol"):
         built(net, NO_FAULTS)
     with pytest.raises(NotShownError, match="two names of the net make one place"):
