@@ -496,7 +496,9 @@ def test_a_controller_of_any_name_is_told_from_the_coordinator() -> None:
 
 
 def test_a_transition_that_bears_a_name_of_the_net_that_is_left_is_refused() -> None:
-    with pytest.raises(InputError, match="F2001"):
-        sealed_outages(split(gated(together="life/dies")))
+    net = gated(together="life/dies")
+    with pytest.raises(InputError, match="F4001"):
+        split(net)
+    forged = replace(bundled(gated).decomposition, net=net)
     with pytest.raises(NotShownError):
-        examined(Bundle(split(gated(together="life/dies")), bundled(gated).verdicts, bundled(gated).evidence))
+        examined(Bundle(forged, bundled(gated).verdicts, bundled(gated).evidence))

@@ -42,8 +42,9 @@ def test_a_host_that_its_coordinator_can_never_let_in_ends_and_the_coordinator_w
         assert problem.code == "F5020"
         assert problem.message.startswith("'b', the coordinator ")
         assert [kind for kind, _ in said if kind == "refused"] == ["refused"]
-        (refused,) = told
+        refused, gone = told
         assert refused.startswith("refused: the host of 'a' is refused: 'a' ")
+        assert gone == "gone: the host of 'a' that was refused is gone"
         assert hosts.driver.sent == 0
         assert not waiting.done()
         right = asyncio.create_task(hosts.host(A, MemoryJournal()).main())
