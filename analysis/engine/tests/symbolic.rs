@@ -443,6 +443,37 @@ fn places_that_were_merged_for_the_search_are_told_apart_in_what_it_finds() {
     assert!(merged > 1500 * factor(), "{merged}");
 }
 
+/// A lock that goes on by the right one of two moves at each of so many stages, and begins anew by the wrong one. It opens
+/// onto a place that is marked. Beside it a token goes through rooms that are one place for the search.
+fn lock(stages: u32) -> (usize, Vec<Transition>, Vec<u32>) {
+    let (full, never, rooms) = (stages + 1, stages + 2, stages + 3);
+    let kept = |from: u32, to: u32| Transition::new(&[from], &[to], &[], &[never], &[]);
+    let right = (0..stages).map(|at| kept(at, at + 1));
+    let wrong = (1..stages).map(|at| kept(at, 0));
+    let room = (rooms..rooms + 3).map(|at| Transition::new(&[at], &[at + 1], &[], &[], &[]));
+    let open = kept(stages, full);
+    ((rooms + 4) as usize, right.chain(wrong).chain(room).chain([open]).collect(), vec![0, full, rooms])
+}
+
+#[test]
+fn a_smaller_net_with_contact_stands_for_nothing_however_deep_the_contact_is() {
+    for stages in [1, 40] {
+        let (places, transitions, initial) = lock(stages);
+        let found = |marked: &[u32]| {
+            watched(|watch| Symbolic::explore_merged(places, &transitions, marked, 1 << 24, watch)).is_some()
+        };
+        assert!(!found(&initial));
+        assert!(found(&[initial[0], initial[2]]));
+    }
+}
+
+#[test]
+fn contact_that_any_run_meets_is_seen_before_the_diagram_needs_its_memory() {
+    let (places, transitions, initial) = lock(1);
+    let found = watched(|watch| Symbolic::explore_merged(places, &transitions, &initial, 1, watch));
+    assert!(found.is_none());
+}
+
 /// Counters that come to their end after as many steps as they have places, and beside them a ring that never does.
 fn counters_and_ring(counters: u32, length: u32) -> (usize, Vec<Transition>, Vec<u32>) {
     let arc = |from: u32, to: u32| Transition::new(&[from], &[to], &[], &[], &[]);

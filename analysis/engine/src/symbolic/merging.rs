@@ -234,7 +234,8 @@ impl<'a> Draft<'a> {
     }
 
     fn copies(&mut self) -> bool {
-        // A number that places with the same moves have in common; of those that have, the moves are compared.
+        // A number that places have in common if they have the same moves and are marked, its lowest bit, or are not. Of
+        // those that have it in common, the moves are compared.
         let mut sums: Vec<u64> = self.marked.iter().map(|&marked| u64::from(marked)).collect();
         for (t, each) in self.moves.iter().enumerate() {
             for (side, kind) in [(&each.inputs, 2), (&each.outputs, 3)] {
@@ -262,10 +263,7 @@ impl<'a> Draft<'a> {
         let mut to: Vec<u32> = (0..self.places() as u32).collect();
         for group in groups {
             let first = group[0] as usize;
-            let like = |&&place: &&u32| {
-                let place = place as usize;
-                around[place] == around[first] && self.marked[place] == self.marked[first]
-            };
+            let like = |&&place: &&u32| around[place as usize] == around[first];
             group.iter().filter(like).for_each(|&place| to[place as usize] = first as u32);
         }
         self.put(&to, Stands::All)

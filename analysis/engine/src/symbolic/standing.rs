@@ -14,6 +14,7 @@ use super::order::Order;
 use super::ordered::{Events, Ordered};
 use super::race::Patience;
 use super::space::Symbolic;
+use super::trial::meets_contact;
 use super::zdd::{EMPTY, Node, Store, UNIT};
 use crate::budget::{Stop, Watch};
 use crate::net::Transition;
@@ -105,6 +106,9 @@ impl Symbolic {
         bytes: usize,
         watch: &mut Watch<'_>,
     ) -> Result<Option<Self>, Stop> {
+        if meets_contact(&smaller, watch)? {
+            return Ok(None);
+        }
         let Merged { transitions: its, initial: begin, stands } = smaller;
         let found = Self::raced(stands.len(), (its, begin), bytes, None, Patience::Long, watch)?;
         let mut small = found.ok_or(Stop::Memory)?;
