@@ -473,6 +473,8 @@ class Diagram:
         """The markings of a set in which some places hold a token and others do not."""
     def which(self, markings: MarkingSet, tests: list[tuple[list[int], list[int]]]) -> list[bool]:
         """For each test (`full`, `empty`), whether `having` would find a marking; all in one pass."""
+    def counts(self, markings: MarkingSet, tests: list[tuple[list[int], list[int]]]) -> list[int]:
+        """For each test (`full`, `empty`), how many markings `having` would find, exactly; without making the sets."""
     def firable(self, markings: MarkingSet) -> MarkingSet:
         """The markings of a set in which some transition is firable and openable."""
     def in_contact(self, markings: MarkingSet) -> MarkingSet:

@@ -257,13 +257,14 @@ def _found(net: Net, asked: _Asked, queries: Sequence[Query]) -> tuple[CheckRepo
     from firable.analysis.cures.finding import explained
     from firable.cli.cache import Kept
     from firable.cli.progress import progress_line
+    from firable.nets.verdict import Status
 
     with progress_line(asked.progress) as line:
         found = check_net(net, asked.discipline, asked.budget, method=asked.method, queries=queries, progress=line)
     figures = found.figures.to_json()
     if asked.structure:
-        contacts = found.figures.contacts
-        contact_free = None if contacts is None else not contacts
+        status = found.verdict("contact-free").status
+        contact_free = {Status.PROVED: True, Status.VIOLATED: False}.get(status)
         # Anew, since the structure is wanted most where the exploration has used up its own time.
         figures["structure"] = structure_json(
             net, contact_free=contact_free, seconds=asked.budget.seconds, discipline=asked.discipline

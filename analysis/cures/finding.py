@@ -270,7 +270,7 @@ class _Search(Generic[S]):
         except InputError:
             return False
         self._explored += space.n_markings
-        return space.complete and not any(space.contacts()) and self._fired <= _fired(space)
+        return space.complete and not space.meet_contact() and self._fired <= _fired(space)
 
     def _tried(self, name: str, changes: _Changes) -> _Cured | None:
         """What the changes cure, as the check says; None where they do not cure this, or break more."""

@@ -175,6 +175,10 @@ class StateSpace(Protocol[S]):
         """For each transition, in how many markings it is in contact."""
         ...
 
+    def meet_contact(self) -> Sequence[int]:
+        """The transitions that are in contact in some marking found, ascending."""
+        ...
+
     def witness_of_contact(self, among: Sequence[int]) -> Witness | None:
         """A firing sequence to a marking in contact at one of some transitions, as `witness` gives it."""
         ...
@@ -232,6 +236,10 @@ class Derived(Generic[S]):
     def contacts(self: StateSpace[S]) -> Sequence[int]:
         """For each transition, in how many markings it is in contact."""
         return tuple(self.count(self.in_contact(t)) for t in range(len(self.net.transitions)))
+
+    def meet_contact(self: StateSpace[S]) -> Sequence[int]:
+        """The transitions that are in contact in some marking found, ascending."""
+        return tuple(t for t, count in enumerate(self.contacts()) if count)
 
     def witness_of_contact(self: StateSpace[S], among: Sequence[int]) -> Witness | None:
         """A firing sequence to a marking in contact at one of some transitions, as `witness` gives it."""

@@ -32,7 +32,7 @@ from firable.nets.formula import And, Deadlock, Firable, Formula, Holds, Not, Or
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import Cost, Witness
 from firable.semantics.algebra import Bitwise, BooleanAlgebra
-from firable.semantics.firing import Valuation, in_contact
+from firable.semantics.firing import Valuation
 from firable.semantics.formulas import evaluate
 from firable.semantics.trace import Discipline
 
@@ -247,32 +247,43 @@ class SymbolicSpace(Derived[MarkingSet]):
         return full, [index[place] for place in (*transition.outputs, *transition.inhibitive)]
 
     def contacts(self) -> Sequence[int]:
-        """For each transition, in how many markings it is in contact.
-
-        Whether there are any is asked for all at once; only those where there are cost a set and a count each.
-        """
+        """For each transition, in how many markings it is in contact."""
         counts = [0] * len(self.net.transitions)
-        inside = self.engine.in_contact(self.reach)
-        if not inside:
-            return tuple(counts)
-        algebra = Bitwise(true=inside, false=self.none)
-        tests = [(t, test) for t in range(len(counts)) for test in self._contact_tests(t)]
-        met = self.engine.which(inside, [test for _, test in tests])
-
-        def holds(place: int) -> MarkingSet:
-            return self.engine.having(inside, [place], [])
-
-        for t in {t: None for (t, _), here in zip(tests, met, strict=True) if here}:
-            counts[t] = in_contact(algebra, self.net, t, holds).count()
+        tests = [(t, test) for t in self.meet_contact() for test in self._contact_tests(t)]
+        found = self.engine.counts(self.in_any_contact, [test for _, test in tests])
+        for (t, _), count in zip(tests, found, strict=True):
+            counts[t] += count
         return tuple(counts)
 
+    @cached_property
+    def in_any_contact(self) -> MarkingSet:
+        """The markings in contact at some transition."""
+        return self.engine.in_contact(self.reach)
+
+    def meet_contact(self) -> Sequence[int]:
+        """The transitions that are in contact in some marking, ascending; asked for all at once, without their sets."""
+        if not self.in_any_contact:
+            return ()
+        tests = [(t, test) for t in range(len(self.net.transitions)) for test in self._contact_tests(t)]
+        met = self.engine.which(self.in_any_contact, [test for _, test in tests])
+        return sorted({t for (t, _), here in zip(tests, met, strict=True) if here})
+
+    def witness_of_contact(self, among: Sequence[int]) -> Witness | None:
+        """A firing sequence to a marking in contact at one of some transitions, as `witness` gives it."""
+        if set(among) >= set(self.meet_contact()):
+            return self.witness(self.in_any_contact)
+        return super().witness_of_contact(among)
+
     def _contact_tests(self, t: int) -> list[tuple[list[int], list[int]]]:
-        """For each output place outside I(t): what must be full, that place among it, and what must be empty."""
+        """What must be full and empty for contact: one output place outside I(t) full, and those before it empty.
+
+        So no marking in contact passes two of the tests.
+        """
         transition, index = self.net.transitions[t], self.net.place_index
         full = [index[place] for place in (*transition.inputs, *transition.permissive)]
         empty = [index[place] for place in transition.inhibitive]
         outside = [index[place] for place in transition.outputs if place not in transition.inputs]
-        return [([*full, place], empty) for place in outside]
+        return [([*full, place], [*empty, *outside[:at]]) for at, place in enumerate(outside)]
 
     def firable_together(self, pairs: Sequence[tuple[int, int]]) -> Sequence[bool]:
         """For each pair of transitions, whether some marking makes both firable by Eq. (1)."""

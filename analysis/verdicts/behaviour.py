@@ -154,11 +154,9 @@ def contact_free(behaviour: Behaviour[Any]) -> Verdict:
     """No reachable marking is in contact: the guard of the firing rule hides no collision."""
 
     def find() -> Answer:
-        space, counts = behaviour.space, behaviour.contacts
-        if counts:
-            net = space.net
-            blocked = [net.transition_index[name] for name in counts]
-            return no(tuple(counts), _nearest_contact(space, blocked))
+        space = behaviour.space
+        if blocked := space.meet_contact():
+            return no(tuple(space.net.transitions[t].name for t in blocked), _nearest_contact(space, blocked))
         space.require_complete()
         return yes()
 

@@ -115,8 +115,7 @@ class Exploration:
         def find() -> Answer:
             self.space.require_complete()
             net, steps = self.protocol.net, self.protocol.steps
-            found = [t for t, count in enumerate(self.space.contacts()) if count]
-            added = [t for t in found if not steps[net.transitions[t].name].fires]
+            added = [t for t in self.space.meet_contact() if not steps[net.transitions[t].name].fires]
             if not added:
                 return yes()
             return no(tuple(net.transitions[t].name for t in added), self.space.witness_of_contact(added))

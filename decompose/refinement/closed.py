@@ -240,7 +240,7 @@ class _Block:
         return no((), witness)
 
     def contact_free(self) -> Answer:
-        contacts = [t for t, count in enumerate(self.graph.contacts()) if count]
+        contacts = self.graph.meet_contact()
         if not contacts:
             self.graph.require_complete()
             return yes()

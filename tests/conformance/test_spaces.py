@@ -75,6 +75,13 @@ def test_a_space_has_the_sets_of_the_oracle(name: str, net: Net, data: st.DataOb
         same(space.may_fire(t), oracle.may_fire(t))
         same(space.in_contact(t), oracle.in_contact(t))
     assert list(space.contacts()) == list(oracle.contacts())
+    blocked = list(space.meet_contact())
+    assert blocked == list(oracle.meet_contact())
+    for among in (blocked, blocked[:1], blocked[1:]):
+        witness = space.witness_of_contact(among)
+        assert (witness is None) == (not among)
+        if witness is not None:
+            assert net.marking(witness.marking) in oracle.algebra.disjunction(map(oracle.in_contact, among))
     assert [n > 0 for n in space.fired()] == [n > 0 for n in oracle.fired()]
     assert list(space.live()) == list(oracle.live())
     assert space.reversible() == oracle.reversible()

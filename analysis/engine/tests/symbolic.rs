@@ -219,6 +219,19 @@ fn every_operation_agrees_with_sets_of_masks() {
         let found = watched(|watch| both.space.closure(&[], targets_node, within_node, By::Forward, watch));
         both.check(found, &forward, "forward within");
 
+        let half = both.naive.places / 2;
+        let all = both.naive.places;
+        let mut places = |from: u32, to: u32| (from..to).filter(|_| numbers.below(3) == 0).collect::<Vec<u32>>();
+        let tests: Vec<_> = (0..8).map(|t| (places(0, all), places(if t < 4 { half } else { 0 }, all))).collect();
+        let passes =
+            |(full, empty): &(Vec<u32>, Vec<u32>), m: u32| m & mask(full) == mask(full) && m & mask(empty) == 0;
+        for (set, node) in [(&reach, root), (&within, within_node), (&Set::new(), EMPTY)] {
+            let counts: Vec<u64> =
+                tests.iter().map(|test| set.iter().filter(|&&m| passes(test, m)).count() as u64).collect();
+            let found = watched(|watch| both.space.counts(node, &tests, watch));
+            assert_eq!(found.iter().map(|count| count.first().copied().unwrap_or(0)).collect::<Vec<_>>(), counts);
+        }
+
         for t in 0..both.naive.transitions.len() {
             let may_fire = reach.iter().copied().filter(|&m| both.naive.firable(t, m)).collect();
             let found = watched(|watch| both.space.firable(&[], root, t, watch));
@@ -292,6 +305,33 @@ fn a_thousand_philosophers_have_three_to_the_thousand_markings_and_two_deadlocks
     let alive = watched(|watch| space.all(&[], reach, Events::Tests, watch));
     let deadlocks = watched(|watch| space.binary(&[], Binary::Difference, reach, alive, watch));
     assert_eq!(watched(|watch| space.count(deadlocks, watch))[0], 2);
+}
+
+#[test]
+fn tests_are_counted_exactly_in_128_bits_and_beyond() {
+    for machines in [1, 60, 127, 128, 200] {
+        let turn = |at: u32| [(at, at + 1), (at + 1, at)].map(|(p, q)| Transition::new(&[p], &[q], &[], &[], &[]));
+        let transitions = (0..machines).flat_map(|machine| turn(2 * machine)).collect();
+        let initial: Vec<u32> = (0..machines).map(|machine| 2 * machine).collect();
+        let mut space = watched(|watch| {
+            Symbolic::explore(2 * machines as usize, transitions, initial.clone(), 1 << 26, None, watch)
+        });
+        let reach = space.reach;
+        let tests = [
+            (vec![], vec![]),
+            (vec![0], vec![]),
+            (vec![1], vec![2 * machines - 1]),
+            (vec![0, 1], vec![]),
+            (vec![0], vec![0]),
+            (initial.clone(), vec![]),
+        ];
+        let counts = watched(|watch| space.counts(reach, &tests, watch));
+        let powers = [Some(machines), Some(machines - 1), (machines > 1).then(|| machines - 2), None, None, Some(0)];
+        for (count, power) in counts.iter().zip(powers) {
+            assert_eq!(bits(count), power.map_or(0, |power| power as usize + 1), "{machines}");
+            assert_eq!(count.iter().map(|word| word.count_ones()).sum::<u32>(), u32::from(power.is_some()));
+        }
+    }
 }
 
 /// Rings that turn for ever and chains that come to an end, side by side; some steps are gated by a place elsewhere.

@@ -187,6 +187,10 @@ impl Diagram {
         places.iter().try_for_each(|&place| self.place(place).map(|_| ()))
     }
 
+    fn tested(&self, tests: &[(Vec<u32>, Vec<u32>)]) -> PyResult<()> {
+        tests.iter().try_for_each(|(full, empty)| self.places(full).and_then(|()| self.places(empty)))
+    }
+
     fn fired<'a>(&self, mut some: impl Iterator<Item = &'a usize>) -> PyResult<()> {
         match some.find(|&&t| t >= self.transitions) {
             Some(t) => Err(PyIndexError::new_err(format!("there is no transition {t} of {}", self.transitions))),
@@ -251,11 +255,20 @@ impl Diagram {
 
     fn which(&self, py: Python<'_>, markings: &MarkingSet, tests: Vec<(Vec<u32>, Vec<u32>)>) -> PyResult<Vec<bool>> {
         let set = self.mine(markings)?;
-        for (full, empty) in &tests {
-            self.places(full)?;
-            self.places(empty)?;
-        }
+        self.tested(&tests)?;
         self.shared.work(py, |space, roots, watch| space.which(roots, set, &tests, watch))
+    }
+
+    fn counts<'py>(
+        &self,
+        py: Python<'py>,
+        markings: &MarkingSet,
+        tests: Vec<(Vec<u32>, Vec<u32>)>,
+    ) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        let set = self.mine(markings)?;
+        self.tested(&tests)?;
+        let counts = self.shared.work(py, |space, _, watch| space.counts(set, &tests, watch))?;
+        counts.iter().map(|count| int(py, count)).collect()
     }
 
     fn firable(&self, py: Python<'_>, markings: &MarkingSet) -> PyResult<MarkingSet> {

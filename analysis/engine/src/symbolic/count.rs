@@ -163,7 +163,30 @@ fn add(sum: &mut Natural, short: &[u64]) -> usize {
 
 /// How many markings a set holds.
 pub fn markings(diagram: &Diagram, set: Node, watch: &mut Watch<'_>) -> Result<Natural, Stop> {
-    Counting { diagram, suffixes: None, sums: Sums::new() }.value(Want::Markings(set), watch)
+    let mut counting = Counting { diagram, suffixes: None, table: None, sums: Sums::new() };
+    counting.value(Want::Markings(set), watch)
+}
+
+/// For each suffix, in how many markings of a set it can fire.
+///
+/// Of the sums only those of markings are kept from one to the next: the others are as many as nodes above its literals.
+pub fn firable(
+    diagram: &Diagram,
+    suffixes: &Suffixes,
+    events: &[Suffix],
+    set: Node,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<Natural>, Stop> {
+    let mut counting = Counting { diagram, suffixes: Some(suffixes), table: None, sums: Sums::new() };
+    counting.find(Want::Markings(set), watch)?;
+    let kept = counting.sums.terms.len();
+    let mut counts = Vec::with_capacity(events.len());
+    for &event in events {
+        counts.push(counting.value(Want::firable(event, set), watch)?);
+        counting.sums.terms.truncate(kept);
+        counting.sums.known.retain(|want, _| matches!(want, Want::Markings(_)));
+    }
+    Ok(counts)
 }
 
 /// How many pairs there are of a marking of a set and an event of a table (of tests) that can fire in it.
@@ -175,7 +198,7 @@ pub fn edges(
     levels: u32,
     watch: &mut Watch<'_>,
 ) -> Result<Natural, Stop> {
-    let mut counting = Counting { diagram, suffixes: Some((suffixes, table)), sums: Sums::new() };
+    let mut counting = Counting { diagram, suffixes: Some(suffixes), table: Some(table), sums: Sums::new() };
     counting.find(Want::Edges(set), watch)?;
     counting.find(Want::Markings(set), watch)?;
     let mut wanted = Vec::new();
@@ -194,7 +217,8 @@ pub fn edges(
 
 struct Counting<'a> {
     diagram: &'a Diagram,
-    suffixes: Option<(&'a Suffixes, &'a Table)>,
+    suffixes: Option<&'a Suffixes>,
+    table: Option<&'a Table>,
     sums: Sums,
 }
 
@@ -223,7 +247,7 @@ impl Counting<'_> {
     }
 
     fn needs(&self, suffix: Suffix) -> u32 {
-        self.suffixes.map_or(0, |(suffixes, _)| suffixes.get(suffix).needs)
+        self.suffixes.map_or(0, |suffixes| suffixes.get(suffix).needs)
     }
 
     /// What a number is the sum of.
@@ -234,7 +258,7 @@ impl Counting<'_> {
                 parts.extend([Want::Markings(store.lo(node)), Want::Markings(store.hi(node))]);
             }
             Want::Firable(suffix, node) => {
-                let Some((suffixes, _)) = self.suffixes else { return };
+                let Some(suffixes) = self.suffixes else { return };
                 let literal = suffixes.get(suffix);
                 if store.level(node) > literal.level {
                     parts.extend([Want::Firable(suffix, store.lo(node)), Want::Firable(suffix, store.hi(node))]);
@@ -249,7 +273,7 @@ impl Counting<'_> {
                     parts.push(Want::Edges(child));
                     self.awake(child, level - 1, parts);
                 }
-                if let Some((_, table)) = self.suffixes {
+                if let Some(table) = self.table {
                     parts.extend(table.at(level).iter().map(|&event| Want::Firable(event, node)));
                 }
             }
@@ -258,7 +282,7 @@ impl Counting<'_> {
 
     /// The events above a node, up to a level, that may fire on it.
     fn awake(&self, node: Node, to: u32, parts: &mut Vec<Want>) {
-        let Some((_, table)) = self.suffixes else { return };
+        let Some(table) = self.table else { return };
         let own = self.diagram.store.level(node);
         let mut from = own;
         while let Some(level) = table.wake(from, to, own).filter(|_| node != EMPTY) {

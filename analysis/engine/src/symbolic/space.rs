@@ -10,6 +10,7 @@ use super::events::{Suffix, Table};
 use super::image::{All, image};
 pub use super::ordered::Events;
 use super::ordered::Ordered;
+use super::passing::passing;
 pub use super::saturation::By;
 use super::saturation::{Saturation, Workshop};
 use super::walk::LAYERS_WORK;
@@ -178,11 +179,7 @@ impl Symbolic {
         watch: &mut Watch<'_>,
     ) -> Result<Vec<bool>, Stop> {
         self.again(roots, &[set], |space, roots| {
-            let mut events = Vec::with_capacity(tests.len());
-            for (full, empty) in tests {
-                let test = Transition::new(&[], &[], full, empty, &[]);
-                events.push(space.ordered.event(&test, Events::Tests)?);
-            }
+            let events = space.events_of(tests)?;
             let all: Vec<Suffix> = events.iter().flatten().copied().collect();
             let levels = space.ordered.levels();
             let Ordered { diagram, suffixes, .. } = &mut space.ordered;
@@ -296,6 +293,36 @@ impl Symbolic {
     /// How many markings a set holds.
     pub fn count(&self, set: Node, watch: &mut Watch<'_>) -> Result<Natural, Stop> {
         count::markings(&self.ordered.diagram, set, watch)
+    }
+
+    /// For each test, in how many markings of a set its first places are full and its second ones empty.
+    pub fn counts(
+        &mut self,
+        set: Node,
+        tests: &[(Vec<u32>, Vec<u32>)],
+        watch: &mut Watch<'_>,
+    ) -> Result<Vec<Natural>, Stop> {
+        let mut counts = vec![Natural::new(); tests.len()];
+        let (mut at, mut events) = (Vec::new(), Vec::new());
+        for (number, event) in self.events_of(tests)?.into_iter().enumerate() {
+            if let Some(event) = event {
+                at.push(number);
+                events.push(event);
+            }
+        }
+        let Ordered { diagram, suffixes, .. } = &self.ordered;
+        for (number, count) in at.into_iter().zip(passing(diagram, suffixes, &events, set, watch)?) {
+            counts[number] = count;
+        }
+        Ok(counts)
+    }
+
+    /// The suffixes of tests; None where a place would have to be both full and empty.
+    fn events_of(&mut self, tests: &[(Vec<u32>, Vec<u32>)]) -> Result<Vec<Option<Suffix>>, Stop> {
+        let mut event = |(full, empty): &(Vec<u32>, Vec<u32>)| {
+            self.ordered.event(&Transition::new(&[], &[], full, empty, &[]), Events::Tests)
+        };
+        tests.iter().map(&mut event).collect()
     }
 
     /// How many pairs there are of a marking of a set and a transition that may fire in it.
