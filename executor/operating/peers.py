@@ -39,6 +39,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from typing import Final
 
 from firable.executor.links.link import COORDINATOR, Arrival, Link, Refusal, all_called, called, known_otherwise
@@ -110,6 +111,8 @@ class Peers:
         """The machines here that a third host has let another one in with, as it has said."""
         self.is_hands_off = False
         """Whether the machines here are left alone, because another host may have them."""
+        self.hands_off_until_seconds = 0.0
+        """When they no longer are, if nobody is known to have them then."""
         self.unlike: set[str] = set()
         """Those that were met with another bundle or version, and not with this one since."""
         self.hopeless: asyncio.TimerHandle | None = None
@@ -160,18 +163,14 @@ class Peers:
         What a host that is gone had is left alone for `PARTED_SECONDS` more: a broken line may have taken it away.
         """
         loop = asyncio.get_running_loop()
-        until = loop.time() + MEET_SECONDS
+        self.hands_off_until_seconds = max(self.hands_off_until_seconds, loop.time() + MEET_SECONDS)
         self.is_hands_off = True
         try:
-            while self.is_unmet and not is_urgent() and ((claimed := self.claimed) or loop.time() < until):
+            while self.is_unmet and not is_urgent() and (self.claimed or loop.time() < self.hands_off_until_seconds):
                 self.meeting.clear()
-                try:
-                    async with asyncio.timeout_at(None if claimed else until):
+                with suppress(TimeoutError):
+                    async with asyncio.timeout_at(None if self.claimed else self.hands_off_until_seconds):
                         await self.meeting.wait()
-                except TimeoutError:
-                    continue
-                if claimed:
-                    until = loop.time() + PARTED_SECONDS
         except asyncio.CancelledError:
             own = asyncio.current_task()
             if own is None or not is_urgent():
@@ -338,6 +337,8 @@ class Peers:
     def gone(self, peers: Sequence[str]) -> None:
         """A host that was refused is gone; what it had it may have left in the middle of something."""
         self.unfit.discard(tuple(peers))
+        if self.acts.controllers.keys() & set(peers):
+            self.hands_off_until_seconds = asyncio.get_running_loop().time() + PARTED_SECONDS
         gone = set(peers).difference(*self.unfit)  # some may be those of another host that is there
         for name in gone:
             self.turned_away.pop(name, None)

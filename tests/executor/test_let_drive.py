@@ -13,10 +13,11 @@ from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.bound import BoundDriver, bound_driver
 from firable.executor.drivers.device import Point, Value
 from firable.executor.journal.journal import Journal, MemoryJournal
-from firable.executor.links.link import COORDINATOR, run_by_two
+from firable.executor.links.link import COORDINATOR, Refusal, run_by_two
 from firable.executor.operating import peers
 from firable.executor.operating.host import Host
 from firable.executor.operating.situation import Situation
+from firable.nets.diagnostics import Diagnostic
 
 A, CENTRE = ("a",), ("b", COORDINATOR)
 BINDING = """
@@ -177,6 +178,42 @@ def test_machines_of_another_host_are_driven_some_time_after_that_has_gone(monke
         assert alone.peers.is_hands_off
         await until(lambda: cell.written == ["out"], "the safe outputs")
         assert not [why for why in alone.peers.waits() if "leaves its machines alone" in why]
+        await cell.end_all()
+
+    asyncio.run(main())
+
+
+def test_machines_of_a_host_that_is_gone_as_soon_as_it_has_come_are_left_alone_as_long(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(peers, "MEET_SECONDS", 0.1)
+
+    async def main() -> None:
+        cell = Cell(monkeypatch)
+        await cell.begin()
+        alone = cell.start(A)
+        await asyncio.sleep(0.05)
+        alone.peers.refused(A, run_by_two(A))
+        alone.peers.gone(A)  # in the same turn of the loop
+        await asyncio.sleep(0.4)
+        assert cell.written == []
+        await cell.end_all()
+
+    asyncio.run(main())
+
+
+def test_the_end_of_a_host_with_other_machines_puts_nothing_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(peers, "MEET_SECONDS", 0.2)
+    monkeypatch.setattr(peers, "PARTED_SECONDS", 600.0)
+
+    async def main() -> None:
+        cell = Cell(monkeypatch)
+        await cell.begin()
+        alone = cell.start(A)
+        await asyncio.sleep(0)
+        alone.peers.refused(("b",), Refusal(Diagnostic("F5020", "it holds another bundle", "give it this one")))
+        alone.peers.gone(("b",))
+        await until(lambda: cell.written == ["out"], "the safe outputs")
         await cell.end_all()
 
     asyncio.run(main())
