@@ -48,7 +48,8 @@ def _reached(run: Host) -> Situation:
 
 
 def _situation(run: Host) -> Situation:
-    others = "; ".join(sentence for sentence in run.peers.waits() if run.taking_up is None or "is held" not in sentence)
+    waits = run.peers.waits(is_over=run.stopping)
+    others = "; ".join(sentence for sentence in waits if run.taking_up is None or "is held" not in sentence)
     if run.is_whole:
         waiting = tuple(blocked(run.recorder.player, run.recorder.word, run.dispatch.untaken))
     else:

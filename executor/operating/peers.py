@@ -20,10 +20,17 @@ heard later things of this very journal, it ends whoever was met: its places are
 *Machines that another host runs*: a host that is started by mistake beside the one that has its machines would stop
 them by the safe outputs of its start, in the middle of their work. So one that nobody has ever let in leaves them alone
 until somebody does or `MEET_SECONDS` are over; where another host has said that it has them, until it is let in, or the
-other was gone for `PARTED_SECONDS`; where a third one has let the other in, until it is let in itself.
+other was gone for `PARTED_SECONDS`; where a third one has let the other in, until it is let in itself, or a person has
+stopped it and started it again. All that is in the situation as long as it lasts.
 A host that comes back with its journal drives the safe outputs at once, and so does an emergency stop.
 Rejected: to leave them alone until somebody lets it in, however long. A cell is started from its machines at rest, and
 the first host of it may wait for hours for the others.
+Rejected: that the word of a third host lapses some time after that host has gone, as a rival's own does. It may be the
+only one that is linked to both, and its end says nothing of the rival, whose machines are at work for as long as they
+find something to do without it. To wait costs little: nothing moves here before a coordinator is back, which says it
+again, lets this host in or ends it; and what a dead host has left at work is for the watchdogs of its devices to stop.
+Where none comes back only a person can see that the rival has ended, too.
+Rejected: a command by which that person says so. To stop the host and start it again says it, by somebody who is there.
 
 *Another bundle or version*: of two such hosts neither can know which is wrong, and neither will be let in by the other.
 One that nobody has ever let in ends when all coordinators of its machines refuse it so, and none that fits has come
@@ -107,12 +114,14 @@ class Peers:
         """What is said of each that was refused and has not come back as it should."""
         self.unfit: set[tuple[str, ...]] = set()
         """The machines of each host that was refused and has not gone since."""
-        self.elsewhere: set[str] = set()
-        """The machines here that a third host has let another one in with, as it has said."""
+        self.elsewhere: dict[str, str] = {}
+        """The machines here that another host was let in with, and in a phrase the third one that has said so last."""
         self.is_hands_off = False
         """Whether the machines here are left alone, because another host may have them."""
         self.hands_off_until_seconds = 0.0
         """When they no longer are, if nobody is known to have them then."""
+        self.parted: set[str] = set()
+        """Those of them that the host had which was refused and has gone last."""
         self.unlike: set[str] = set()
         """Those that were met with another bundle or version, and not with this one since."""
         self.hopeless: asyncio.TimerHandle | None = None
@@ -154,7 +163,7 @@ class Peers:
     @property
     def claimed(self) -> tuple[str, ...]:
         """The controllers here whose machines another host has, as far as is known."""
-        theirs = self.elsewhere.union(*self.unfit)
+        theirs = set(self.elsewhere).union(*self.unfit)
         return tuple(sorted(theirs.intersection(self.acts.controllers)))
 
     async def let_drive(self, is_urgent: Callable[[], bool]) -> None:
@@ -218,17 +227,38 @@ class Peers:
         if self.pause_seconds > self.repeat_seconds and self.timer is not None:
             self._repeat_later(self.repeat_seconds)
 
-    def waits(self) -> Iterator[str]:
-        """What waits for another machine, in a sentence each."""
+    def waits(self, *, is_over: bool = False) -> Iterator[str]:
+        """What waits for another machine, in a sentence each; or has waited, at the end of the run."""
         yield from waits(self.acts.coordinators, self.acts.controllers, self.names - self.connected_to)
         if self.is_unmet:
             yield "nothing moves here before another host of the cell has been met"
-        if self.is_hands_off and (claimed := self.claimed):
-            yield (
-                f"another host has {all_called(claimed)}: this one leaves its machines alone, and does not read their "
-                "emergency stops, until it is let in, or the other, where it has said so itself, is gone for long"
-            )
+        if self.is_hands_off and self.acts.controllers:
+            yield from self._left_alone(is_over=is_over)
         yield from dict.fromkeys(map(self._missing, self.never_met))
+
+    def _left_alone(self, *, is_over: bool) -> Iterator[str]:
+        """That the machines here are left alone, why, until when, and what is to be done where that never comes."""
+        if said := sorted(self.elsewhere.keys() & self.acts.controllers):
+            by = " and ".join(dict.fromkeys(self.elsewhere[name] for name in said))
+            why, until = f"{by} has let another one in with {all_called(said)}", " itself"
+        elif claimed := self.claimed:
+            why, until = f"another host has {all_called(claimed)}", f", or that has been gone for {PARTED_SECONDS:g} s"
+        elif self.parted:
+            why = f"the host that had {all_called(sorted(self.parted))} is gone, or a line to it is broken"
+            until = f", or that has been gone for {PARTED_SECONDS:g} s"
+        else:
+            why = f"another host may have {all_called(self.acts.controllers)}"
+            until = f", or nobody says so within {MEET_SECONDS:g} s of its start"
+        if is_over:
+            yield f"{why}: this one has left its machines alone, and has driven no safe outputs"
+            return
+        alone = "this one leaves its machines alone, and does not read their emergency stops"
+        yield f"{why}: {alone}, until it is let in{until}"
+        if said:
+            yield (
+                f"if somebody has seen that no other host runs {all_called(said)} any more, stop this one and start it "
+                f"again: it drives the safe outputs {MEET_SECONDS:g} s later, unless that is said again"
+            )
 
     def absent(self) -> Iterator[str]:
         """Those that some machine here talks to and that are lost, or stand, in a sentence each.
@@ -322,11 +352,14 @@ class Peers:
             self.told("standing", f"{called(peer)} {standing.phrase}")
 
     def refused(self, peers: Sequence[str], why: Refusal) -> None:
-        """A host was refused."""
-        self._turn_away(peers, f"the host of {all_called(peers)} is refused: {why.problem.message}; {why.problem.hint}")
+        """A host was refused, or has let another one in with machines here, and refuses this one."""
+        theirs, who = self.here.intersection(why.run_by_two), f"the host of {all_called(peers)}"
+        is_third = bool(theirs) and self.here.isdisjoint(peers)
+        refused = f"this host is refused by {who}" if is_third else f"{who} is refused"
+        self._turn_away(peers, f"{refused}: {why.problem.message}; {why.problem.hint}")
         self.unfit.add(tuple(peers))
-        if self.here.isdisjoint(peers):
-            self.elsewhere |= self.here.intersection(why.run_by_two)
+        if is_third:
+            self.elsewhere |= dict.fromkeys(theirs, who)
         self.meeting.set()
         if why.are_unlike:
             self.unlike.update(peers)
@@ -337,7 +370,8 @@ class Peers:
     def gone(self, peers: Sequence[str]) -> None:
         """A host that was refused is gone; what it had it may have left in the middle of something."""
         self.unfit.discard(tuple(peers))
-        if self.acts.controllers.keys() & set(peers):
+        if parted := self.acts.controllers.keys() & set(peers):
+            self.parted = parted
             self.hands_off_until_seconds = asyncio.get_running_loop().time() + PARTED_SECONDS
         gone = set(peers).difference(*self.unfit)  # some may be those of another host that is there
         for name in gone:

@@ -20,6 +20,7 @@ from firable.executor.operating.situation import Situation
 from firable.nets.diagnostics import Diagnostic
 
 A, CENTRE = ("a",), ("b", COORDINATOR)
+ALONE = "this one leaves its machines alone, and does not read their emergency stops, until it is let in"
 BINDING = """
 firable_bind: 1
 cell: cell
@@ -36,6 +37,7 @@ class Cell:
         monkeypatch.setattr(kinds, "entry_points", lambda **_: [entry])
         self.hosts, self.written = Hosts(), list[str]()
         self.end = MemoryEnd("box")
+        self.told: list[str] = []
         self.tasks: list[asyncio.Task[Situation]] = []
 
     async def begin(self) -> None:
@@ -51,6 +53,7 @@ class Cell:
         host = self.hosts.host(machines, journal or MemoryJournal())
         if machines == A:
             host.driver = bound_driver(parse_binding(BINDING), SPLIT.net, SPLIT.subnet("a"))
+            host.tell = lambda _, sentence: self.told.append(sentence)
         self.tasks.append(asyncio.create_task(host.main()))
         return host
 
@@ -58,6 +61,11 @@ class Cell:
         for task in self.tasks:
             task.cancel()
         await asyncio.gather(*self.tasks, return_exceptions=True)
+
+
+def left_alone(host: Host) -> list[str]:
+    """What the situation says of machines that are left alone, and of what is to be done about it."""
+    return [why for why in host.situation().message.split("; ") if "machines alone" in why or "start it again" in why]
 
 
 def test_a_host_beside_the_one_that_has_its_machines_writes_them_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -94,19 +102,23 @@ def test_a_host_whose_machines_another_one_has_leaves_them_alone_until_it_is_sto
         driver = mistaken.driver
         assert isinstance(driver, BoundDriver)
         assert not driver.has_begun
-        (left_alone,) = [why for why in mistaken.peers.waits() if "leaves its machines alone" in why]
-        assert left_alone.startswith("another host has 'a'")
+        assert left_alone(mistaken) == [f"another host has 'a': {ALONE}, or that has been gone for 30 s"]
         mistaken.stop()
         ended = await cell.tasks[-1]
         assert cell.written == []
         assert "not confirmed" not in str(ended)
+        assert "this one has left its machines alone, and has driven no safe outputs" in str(ended)
+        assert "until it is let in" not in str(ended)
 
     asyncio.run(main())
 
 
-def test_a_host_that_a_third_one_refuses_for_another_leaves_its_machines_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where the link leads to the coordinator alone, that says who has them, and has said so when it ends."""
+def test_a_host_that_a_third_one_refuses_for_another_leaves_its_machines_alone_though_that_is_gone_for_long(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where the link leads to the coordinator alone, its end says nothing of the host that has them."""
     monkeypatch.setattr(peers, "MEET_SECONDS", 0.1)
+    monkeypatch.setattr(peers, "PARTED_SECONDS", 0.1)
 
     async def main() -> None:
         cell = Cell(monkeypatch)
@@ -115,10 +127,63 @@ def test_a_host_that_a_third_one_refuses_for_another_leaves_its_machines_alone(m
         await asyncio.sleep(0)
         mistaken.peers.refused(CENTRE, run_by_two(A))
         mistaken.peers.gone(CENTRE)
-        await asyncio.sleep(0.4)
+        await asyncio.sleep(0.6)
         assert mistaken.peers.claimed == ("a",)
         assert cell.written == []
         await cell.end_all()
+
+    asyncio.run(main())
+
+
+def test_who_has_said_that_another_host_is_let_in_is_told_and_what_a_person_does_when_that_has_ended(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def main() -> None:
+        cell = Cell(monkeypatch)
+        await cell.begin()
+        mistaken = cell.start(A)
+        await until(lambda: mistaken.peers.is_hands_off, "the driver")
+        mistaken.peers.refused(CENTRE, run_by_two(A))
+        mistaken.peers.refused(A, run_by_two(A))  # and the other one says so itself
+        assert cell.told[0] == (
+            "this host is refused by the host of 'b', the coordinator: 'a' is run by two hosts; "
+            "each machine has one host: end one of the two"
+        )
+        assert cell.told[1].startswith("the host of 'a' is refused: 'a' is run by two hosts; ")
+        for gone in (A, CENTRE):
+            mistaken.peers.gone(gone)
+            assert left_alone(mistaken) == [
+                f"the host of 'b', the coordinator has let another one in with 'a': {ALONE} itself",
+                "if somebody has seen that no other host runs 'a' any more, stop this one and start it again: "
+                "it drives the safe outputs 3 s later, unless that is said again",
+            ]
+        await cell.end_all()
+
+    asyncio.run(main())
+
+
+@pytest.mark.parametrize("is_said_again", [True, False])
+def test_a_host_that_is_started_again_after_a_third_ones_word_drives_the_safe_outputs_unless_that_is_said_again(
+    is_said_again: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(peers, "MEET_SECONDS", 0.2)
+
+    async def main() -> None:
+        cell, journal = Cell(monkeypatch), MemoryJournal()
+        await cell.begin()
+        for is_said in (True, is_said_again):
+            host = cell.start(A, journal)
+            await asyncio.sleep(0)
+            if is_said:
+                host.peers.refused(CENTRE, run_by_two(A))
+                await asyncio.sleep(0.5)
+                assert cell.written == []
+                await cell.end_all()
+                assert cell.written == []
+        if not is_said_again:
+            await until(lambda: cell.written == ["out"], "the safe outputs")
+            assert not left_alone(host)
+            await cell.end_all()
 
     asyncio.run(main())
 
@@ -176,8 +241,10 @@ def test_machines_of_another_host_are_driven_some_time_after_that_has_gone(monke
         await until(lambda: not alone.peers.claimed, "its end")
         assert cell.written == []
         assert alone.peers.is_hands_off
+        gone = "the host that had 'a' is gone, or a line to it is broken"
+        assert left_alone(alone) == [f"{gone}: {ALONE}, or that has been gone for 0.4 s"]
         await until(lambda: cell.written == ["out"], "the safe outputs")
-        assert not [why for why in alone.peers.waits() if "leaves its machines alone" in why]
+        assert not left_alone(alone)
         await cell.end_all()
 
     asyncio.run(main())
@@ -197,6 +264,7 @@ def test_machines_of_a_host_that_is_gone_as_soon_as_it_has_come_are_left_alone_a
         alone.peers.gone(A)  # in the same turn of the loop
         await asyncio.sleep(0.4)
         assert cell.written == []
+        assert len(left_alone(alone)) == 1
         await cell.end_all()
 
     asyncio.run(main())
@@ -226,10 +294,12 @@ def test_a_host_that_hears_of_nobody_drives_the_safe_outputs_after_a_while(monke
         cell = Cell(monkeypatch)
         await cell.begin()
         alone = cell.start(A)
-        await asyncio.sleep(0)
+        await until(lambda: alone.peers.is_hands_off, "the driver")
         assert cell.written == []
+        assert left_alone(alone) == [f"another host may have 'a': {ALONE}, or nobody says so within 0.2 s of its start"]
         await until(lambda: cell.written == ["out"], "the safe outputs")
         assert alone.peers.is_unmet
+        assert not left_alone(alone)
         await cell.end_all()
 
     asyncio.run(main())
