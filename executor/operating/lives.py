@@ -54,7 +54,7 @@ async def to_the_end(run: Host) -> Situation:
 
 async def _live(run: Host) -> Situation | None:
     """One life, to its end; None where the next has begun."""
-    clock = run.clock = run.acts.clock = RunClock.going_on(run.begin_seconds, run.speed)
+    clock = run.clock = run.acts.clock = RunClock.going_on(run.now_seconds(), run.speed)
     run.outcome = clock.loop.create_future()
     if run.watching is not None:
         run.watching.begin(clock)
@@ -90,7 +90,6 @@ async def _outcome(run: Host, outcome: asyncio.Future[Situation]) -> Situation:
 
 def _stay(run: Host, driver: Latched) -> None:
     """Begin the next life, latched by the emergency stop that has ended this one; what it has noted the next writes."""
-    run.begin_seconds = run.now_seconds()
     unconfirmed = tuple(run.driver.unconfirmed)
     run.driver, run.latch, run.said = driver, Latch(run.emergency or "", driver, unconfirmed), {}
     run.unwatch()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import io
+import time
 from collections.abc import Awaitable, Callable
 from functools import partial
 
@@ -146,6 +147,34 @@ def test_emergency_stop_ends_a_run_that_nobody_could_reset() -> None:
 
             situation, _ = await executed(one, operator, [])
             assert (situation.state, situation.is_emergency) == (State.STOPPED, True)
+
+    asyncio.run(main())
+
+
+def test_time_of_a_run_goes_on_while_its_next_life_is_begun() -> None:
+    async def main() -> None:
+        stream = io.StringIO()
+        subnets = DECOMPOSITION.subnets
+        recorder = Recorder(NET, net_digest(NET), stream)
+        host = Host(DECOMPOSITION, DryRunDriver(subnets, 0.01), recorder, latched=lambda: DryRunDriver(subnets, 0.01))
+        host.served = True
+        begin = host.begin
+
+        def begin_slowly(*, resume: bool) -> None:  # on a busy host, or from a slow disk
+            time.sleep(0.05)
+            host.note("unwatched")
+            begin(resume=resume)
+
+        host.begin = begin_slowly  # type: ignore[method-assign]
+        run = asyncio.create_task(host.main())
+        await until(lambda: sum(recorder.firings.values()) > 5, "firings")
+        host.emergency_stop("a person")
+        await until(lambda: host.situation().state is State.LATCHED, "the latch")
+        assert host.reset() == ()
+        await until(host.resume, "the answers of the machines")
+        host.stop()
+        await run
+        assert replay(NET, parse_trace(stream.getvalue())).complete
 
     asyncio.run(main())
 
