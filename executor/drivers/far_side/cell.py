@@ -92,11 +92,7 @@ class CellServer:
 
     async def start(self) -> None:
         """Begin to serve; raises `RuntimeError`, with the names of its devices, where an end cannot be had."""
-        for end, devices in self._ends():
-            try:
-                await end.start(partial(self._written_to, devices))
-            except (OSError, RuntimeError) as error:
-                raise RuntimeError(f"{self._names(devices)}: {error}") from error
+        # Shown before anybody can connect: a contact that was not shown yet would be read as an emergency stop.
         for device in self.devices.values():
             for channel in device.channels.values():
                 self._clear(device, channel)
@@ -105,6 +101,11 @@ class CellServer:
         for signal in self.plant.shown:
             self._sensor(signal)
         self.press(pressed=False)
+        for end, devices in self._ends():
+            try:
+                await end.start(partial(self._written_to, devices))
+            except (OSError, RuntimeError) as error:
+                raise RuntimeError(f"{self._names(devices)}: {error}") from error
         self.begun_seconds = asyncio.get_running_loop().time()
 
     def press(self, *, pressed: bool) -> None:

@@ -49,6 +49,8 @@ class OpcUaEnd:
         self.written = written
         if self.server is None:
             await self._serve()
+        while not self.changes.empty():  # what is shown from the beginning
+            await self._show_next()
         self.showing = asyncio.create_task(self._show())
         await self.mend()
 
@@ -98,9 +100,12 @@ class OpcUaEnd:
 
     async def _show(self) -> None:
         while True:
-            point, value = await self.changes.get()
-            node = self.nodes[point]
-            await node.write_value(self.faulty(value, await node.read_data_type_as_variant_type()))
+            await self._show_next()
+
+    async def _show_next(self) -> None:
+        point, value = await self.changes.get()
+        node = self.nodes[point]
+        await node.write_value(self.faulty(value, await node.read_data_type_as_variant_type()))
 
     def faulty(self, value: Value, kind: Any) -> Any:
         """The value as it is shown: with a bad status where answers are garbage."""

@@ -10,12 +10,17 @@ from support.cells import plant_of
 from support.served_cells import DECOMPOSITION, NET, Served, halved, served, unhurried
 
 from firable.executor.cell.disturbances import Drops, NeverCompletes
+from firable.executor.cell.plant import Plant
 from firable.executor.drivers.bench import until
 from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.bound import bound_driver
+from firable.executor.drivers.device import Point, Value
+from firable.executor.drivers.far_side.cell import CellServer
 from firable.executor.drivers.far_side.ends import binding_text
+from firable.executor.drivers.far_side.modbus_server import ModbusTcpEnd
 from firable.executor.drivers.far_side.mqtt_device import mosquitto
 from firable.executor.drivers.far_side.ports import free_port
+from firable.executor.drivers.modbus_points import address
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.service import patience_with
@@ -49,6 +54,26 @@ def test_workpieces_go_through_a_cell_behind_sockets_none_lost_and_none_doubled(
             assert situation.state is State.STOPPED
             assert [workpiece.processed for workpiece in one.plant.delivered] == [1, 1, 1]
             assert not one.cell.fault
+
+    asyncio.run(main())
+
+
+def test_contact_of_the_emergency_stop_is_closed_from_the_moment_at_which_its_device_listens() -> None:
+    class Watched(ModbusTcpEnd):
+        async def start(self, written: Callable[[Point, Value], None]) -> None:
+            await super().start(written)
+            shown.append(dict(self.shown))
+
+    shown: list[dict[tuple[str, int], int]] = []
+
+    async def main() -> None:
+        port = free_port()
+        binding = parse_binding(binding_text(NET, {"modbus": str(port)}, plant_of("one_robot").sensors))
+        cell = CellServer(binding, NET, Plant(plant_of("one_robot"), workpieces=1), {"modbus": Watched(port)})
+        await cell.start()
+        await cell.stop()
+        contact = address(binding.document.emergency_stop["button"].read)
+        assert shown[0].get((contact.table, contact.number)) == 1
 
     asyncio.run(main())
 
