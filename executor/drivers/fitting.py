@@ -2,19 +2,23 @@
 
 A signal that is not bound would never change, and a command that is not bound would never be sent: either would look
 like a machine that is slow. So both are refused before anything is connected, all together, with their lines.
+
+So are two commands that are written alike, such as a stop that was copied from the line of a start and not edited: the
+machine would do the one for the other. Only words are compared, for a gripper may close in one way wherever it is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from firable.executor.drivers.binding import ACKNOWLEDGED, Binding
+from firable.executor.drivers.device import Point
 from firable.nets.diagnostics import Diagnostic, did_you_mean
 from firable.nets.net import Net, Place, SignalKind
 
 
 def misfits(binding: Binding, net: Net) -> tuple[Diagnostic, ...]:
-    """Where a binding does not fit a net (F5101)."""
+    """Where a binding does not fit a net (F5101), or has two commands look alike to a machine (F5102)."""
     return tuple(_misfits(binding, net))
 
 
@@ -61,6 +65,7 @@ def _misfits(binding: Binding, net: Net) -> Iterator[Diagnostic]:
             )
         else:
             yield from _unanswered(binding, place)
+    yield from _alike(binding, [place for place in places.values() if place.name in document.commands])
 
 
 def _unanswered(binding: Binding, place: Place) -> Iterator[Diagnostic]:
@@ -71,3 +76,22 @@ def _unanswered(binding: Binding, place: Place) -> Iterator[Diagnostic]:
         message = f"'{place.name}' waits for its completion, and '{command.channel}' does not show what is done"
         hint = f"give the channel `done: ADDRESS`, where '{command.device}' shows the number of what it has done"
         yield binding.problem("F5101", ("commands", place.name, "channel"), message, hint)
+
+
+def _alike(binding: Binding, places: Iterable[Place]) -> Iterator[Diagnostic]:
+    """Commands of different words that are written alike, where the channel does not send the words themselves."""
+    document = binding.document
+    written: dict[tuple[str, str, frozenset[tuple[Point, object]]], Place] = {}
+    for place in places:
+        bound = document.commands[place.name]
+        if place.command is None or document.devices[bound.device].channels[bound.channel].command is not None:
+            continue
+        values = frozenset((point, value) for point, value in bound.write.items())
+        first = written.setdefault((bound.device, bound.channel, values), place)
+        if first.command is None or first.command.command == place.command.command:
+            continue
+        told = ", ".join(f"{point}: {value}" for point, value in bound.write.items()) or "nothing but a number"
+        message = f"{place.command} of '{place.name}' is written as {first.command} of '{first.name}' is: {told}"
+        hint = "the machine cannot tell them apart: write for each what it does for it, or give them one word in the net"
+        key = ("write",) if bound.write else ()
+        yield binding.problem("F5102", ("commands", place.name, *key), message, hint)

@@ -224,6 +224,13 @@ def test_a_binding_that_does_not_fit_the_net_is_refused(old: str, new: str, plac
     assert ("F5101", place) in refusal(edited(old, new), fit=True)
 
 
+def test_commands_of_different_words_that_a_machine_cannot_tell_apart_are_refused() -> None:
+    assert refusal(edited("{holding 2: 8}", "{holding 2: 7}"), fit=True) == [("F5102", "18: write")]
+    bare = GOOD.replace(", write: {holding 2: 7}", "").replace(", write: {holding 2: 8}", "")
+    assert refusal(bare, fit=True) == [("F5102", "18: M.stop")]
+    bound_driver(parse_binding(bare.replace("M: {number: holding 1", "M: {command: holding 1")), NET)
+
+
 STOP = "emergency_stop:\n  door: {device: plc, read: discrete 3}\nsignals:"
 
 
