@@ -278,3 +278,12 @@ def test_applying_the_steps_ends_in_time() -> None:
     with pytest.raises(TimeIsOverError):
         draft.apply(found.certificate.steps[0])
     assert check_evidence(found, timeout_ms=0).shown is None
+
+
+def test_a_transition_is_dead_whose_only_need_never_holds() -> None:
+    # what fills its place is dead too, but stands there until the same step: the place is no constant of the arcs yet
+    net = net_of("a", "go: a -> b", "fill: a, b -> c", "leave: c -> ")
+    draft = Draft(net, Firable("fill"), NEVER)
+    draft.apply(Step(Rule.FACTS))
+    draft.apply(Step(Rule.DEAD, (1, 2)))
+    assert list(draft.moves) == [0]

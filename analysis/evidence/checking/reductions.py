@@ -28,8 +28,8 @@ beside a formula; "wants" and "speaks" are of this formula.
   is made none of these is changed, for who flips it needs it. So t can come first in a run in which it fires, and be
   put before one in which it does not: the end differs in what the goal does not want. For a deadlock t reads nothing:
   then it can be made until it is made.
-- *Dead*, *gate*: two needs of a move are never true together; or a need follows from another one. The graph of
-  markings stays as it is.
+- *Dead*, *gate*: two needs of a move are never true together, or one never is; or a need follows from another one.
+  The graph of markings stays as it is.
 - *Implied*: each need of the place follows from another need of the same move, and the goal does not speak of it. By
   induction a run of the draft after is one of the draft before.
 - *Always*: what can always be made is in no deadlock.
@@ -202,9 +202,9 @@ class Draft:
         return (place, False) in self.wanted or (place, True) in self.wanted
 
     def _exclude(self, one: Literal, other: Literal) -> bool:
-        """Whether two literals are never true together in a reachable marking."""
-        if one[0] == other[0]:
-            return one[1] is not other[1]
+        """Whether two literals are never true together in a reachable marking; of one literal twice, never true."""
+        if one[0] == other[0] and one[1] is not other[1]:
+            return True
         return self.facts is not None and self.facts.exclude(one, other)
 
     def _implied(self, t: int, place: int) -> bool:
