@@ -203,6 +203,10 @@ class StateSpace(Protocol[S]):
         """Whether from every marking a target can be reached (AG EF)."""
         ...
 
+    def marked_together(self, pairs: Sequence[tuple[int, int]]) -> Sequence[bool]:
+        """For each pair of places, whether some marking found has a token on both."""
+        ...
+
     def firable_together(self, pairs: Sequence[tuple[int, int]]) -> Sequence[bool]:
         """For each pair of transitions, whether some marking found makes both firable by Eq. (1)."""
         ...
@@ -277,6 +281,11 @@ class Derived(Generic[S]):
         """Whether from every marking a target can be reached (AG EF)."""
         self.require_complete()
         return self.count(self.backward(targets)) == self.n_markings
+
+    def marked_together(self: StateSpace[S], pairs: Sequence[tuple[int, int]]) -> Sequence[bool]:
+        """For each pair of places, whether some marking found has a token on both."""
+        marked = {p: self.marked(p) for p in sorted({p for pair in pairs for p in pair})}
+        return tuple(self.count(self.algebra.conjunction([marked[p], marked[q]])) > 0 for p, q in pairs)
 
     def firable_together(self: StateSpace[S], pairs: Sequence[tuple[int, int]]) -> Sequence[bool]:
         """For each pair of transitions, whether some marking found makes both firable by Eq. (1)."""

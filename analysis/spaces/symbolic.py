@@ -285,6 +285,10 @@ class SymbolicSpace(Derived[MarkingSet]):
         outside = [index[place] for place in transition.outputs if place not in transition.inputs]
         return [([*full, place], [*empty, *outside[:at]]) for at, place in enumerate(outside)]
 
+    def marked_together(self, pairs: Sequence[tuple[int, int]]) -> Sequence[bool]:
+        """For each pair of places, whether some marking has a token on both; all in one pass, without their sets."""
+        return self.engine.which(self.reach, [([p, q], []) for p, q in pairs])
+
     def firable_together(self, pairs: Sequence[tuple[int, int]]) -> Sequence[bool]:
         """For each pair of transitions, whether some marking makes both firable by Eq. (1)."""
         tests = [self._test(t) for t in range(len(self.net.transitions))]

@@ -124,18 +124,15 @@ def _kept_apart(space: StateSpace[S], question: Question, clashes: Sequence[Clas
     """No two clashing places hold a token at one reachable marking; violated by the nearest that do."""
 
     def find() -> Answer:
-        algebra, together, found = space.algebra, space.algebra.disjunction(()), []
-        marked = {p: space.marked(p) for p in sorted({p for clash in clashes for p in (clash.p, clash.q)})}
-        for clash in clashes:
-            both = algebra.conjunction([marked[clash.p], marked[clash.q]])
-            if space.count(both):
-                found.append(clash)
-                together = algebra.disjunction([together, both])
+        met = space.marked_together([(clash.p, clash.q) for clash in clashes])
+        found = [clash for clash, is_met in zip(clashes, met, strict=True) if is_met]
         if not found:
             if clashes:
                 space.require_complete()
             return yes()
-        witness = space.witness(together)
+        algebra = space.algebra
+        both = (algebra.conjunction([space.marked(clash.p), space.marked(clash.q)]) for clash in found)
+        witness = space.witness(algebra.disjunction(both))
         if witness is None:
             raise WitnessError("places hold a token together, and no marking shows it")
         note = clashing(found, space.net.marking(witness.marking))[0].note
@@ -169,11 +166,13 @@ def machines_stopped(space: StateSpace[Any]) -> Verdict:
 
     def find() -> Answer:
         net, found = space.net, []
+        fired = space.fired() if machines(net) else ()
         # Machines with one command first: their violation needs no more than the marking that shows it.
         for machine, names in sorted(machines(net).items(), key=lambda item: len(item[1])):
             if len(names) > 1 and not space.complete:
                 break
-            found += [(machine, name, names[name]) for name in _unanswered(space, names)]
+            sent = {name: sending for name, sending in names.items() if any(fired[t] for t in _senders(net, sending))}
+            found += [(machine, name, names[name]) for name in _unanswered(space, sent)]
         if not found:
             if machines(net):
                 space.require_complete()
@@ -190,21 +189,19 @@ def machines_stopped(space: StateSpace[Any]) -> Verdict:
     return question.ask(space, find)
 
 
-def _unanswered(space: StateSpace[S], names: dict[str, tuple[int, ...]]) -> Iterator[str]:
-    """The commands of one machine that are sent, and that no other one follows or precedes."""
-    sources = {name: _sources(space, sending) for name, sending in names.items()}
-    sources = {name: markings for name, markings in sources.items() if space.count(markings)}
-    if len(sources) > 1 and space.reversible():
+def _unanswered(space: StateSpace[S], sent: dict[str, tuple[int, ...]]) -> Iterator[str]:
+    """The commands of one machine, all of them sent, that no other one follows or precedes."""
+    if len(sent) > 1 and space.reversible():
         return  # from every marking every other one can be reached, so each command follows each
     closing: dict[str, S] = {}
 
     def follows(after: str, before: str) -> bool:
         if after not in closing:
-            closing[after] = space.backward(sources[after])
-        return space.count(space.before(closing[after], _senders(space.net, names[before]))) > 0
+            closing[after] = space.backward(_sources(space, sent[after]))
+        return space.count(space.before(closing[after], _senders(space.net, sent[before]))) > 0
 
-    for name in sources:
-        if not any(follows(name, other) or follows(other, name) for other in sources if other != name):
+    for name in sent:
+        if not any(follows(name, other) or follows(other, name) for other in sent if other != name):
             yield name
 
 

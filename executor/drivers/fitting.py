@@ -92,6 +92,6 @@ def _alike(binding: Binding, places: Iterable[Place]) -> Iterator[Diagnostic]:
             continue
         told = ", ".join(f"{point}: {value}" for point, value in bound.write.items()) or "nothing but a number"
         message = f"{place.command} of '{place.name}' is written as {first.command} of '{first.name}' is: {told}"
-        hint = "the machine cannot tell them apart: write for each what it does for it, or give them one word in the net"
+        hint = "the machine cannot tell them apart: write what is meant by each, or give them one word in the net"
         key = ("write",) if bound.write else ()
         yield binding.problem("F5102", ("commands", place.name, *key), message, hint)

@@ -87,6 +87,8 @@ def test_a_space_has_the_sets_of_the_oracle(name: str, net: Net, data: st.DataOb
     assert space.reversible() == oracle.reversible()
     pairs = [(t, u) for t in transitions for u in transitions if t < u]
     assert list(space.firable_together(pairs)) == list(oracle.firable_together(pairs))
+    pairs = [(p, q) for p in range(len(net.places)) for q in range(p + 1)]
+    assert list(space.marked_together(pairs)) == list(oracle.marked_together(pairs))
     bottom = {marking for marking in reached if space.contains(space.bottom(), marking)}
     assert bottom
     assert all(after in bottom for marking in bottom for _, after in oracle.graph[marking])
