@@ -13,7 +13,7 @@ use super::ordered::Ordered;
 use super::passing::passing;
 pub use super::saturation::By;
 use super::saturation::{Saturation, Workshop};
-use super::walk::LAYERS_WORK;
+use super::walk::{LAYERS_WORK, Walk};
 use super::zdd::{EMPTY, Node};
 use crate::budget::{Stop, Watch};
 use crate::net::Transition;
@@ -36,6 +36,8 @@ pub struct Symbolic {
     pub nodes: usize,
     /// What the next search for a firing sequence may spend on layers.
     pub(super) layers_work: u64,
+    /// The firing sequences that took a search of their own.
+    pub(super) walks: Vec<Walk>,
 }
 
 impl Symbolic {
@@ -61,7 +63,17 @@ impl Symbolic {
         reach: Node,
         (fired, nodes): (u64, usize),
     ) -> Self {
-        Symbolic { transitions, ordered, reach, start, initial, fired, nodes, layers_work: LAYERS_WORK }
+        Symbolic {
+            transitions,
+            ordered,
+            reach,
+            start,
+            initial,
+            fired,
+            nodes,
+            layers_work: LAYERS_WORK,
+            walks: Vec::new(),
+        }
     }
 
     /// Nodes and results.
@@ -247,16 +259,28 @@ impl Symbolic {
         by: By,
         watch: &mut Watch<'_>,
     ) -> Result<Node, Stop> {
+        Ok(self.closure_within(roots, (set, within), by, u64::MAX, watch)?.unwrap_or(EMPTY))
+    }
+
+    /// The same with so many results computed at most; None where it needs more.
+    pub(super) fn closure_within(
+        &mut self,
+        roots: &[Node],
+        (set, within): (Node, Node),
+        by: By,
+        work: u64,
+        watch: &mut Watch<'_>,
+    ) -> Result<Option<Node>, Stop> {
         let held = [set, if within == ANY { EMPTY } else { within }];
         self.again(roots, &held, |space, roots| {
             space.ordered.agenda(by, &space.transitions)?;
             let Ordered { diagram, blocks, parts, agendas, .. } = &mut space.ordered;
-            let Some(agenda) = &agendas[by as usize] else { return Ok(EMPTY) };
+            let Some(agenda) = &agendas[by as usize] else { return Ok(Some(EMPTY)) };
             let mut search = Saturation::new(diagram, blocks, set, within, by)?;
             let mut shop = Workshop { diagram, blocks, parts, agenda, roots };
-            let result = search.run(&mut shop, u64::MAX, watch);
+            let result = search.run(&mut shop, work, watch);
             search.finish(diagram);
-            Ok(result?.unwrap_or(EMPTY))
+            result
         })
     }
 

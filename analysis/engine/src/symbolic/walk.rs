@@ -6,12 +6,15 @@
 //!    back through the layers. The sequence is a shortest one. The work spent on it is bounded, because five thousand
 //!    philosophers need as many layers to starve;
 //! 2. where the targets are deadlocks, and a part of that work was in vain, firings drawn at random and by how few could
-//!    fire next (`stubborn::walk`): they run into one in milliseconds, and what it does not need is cut away;
+//!    fire next (`stubborn::walk`): they run into one in milliseconds, and what it does not need is cut away. If that is
+//!    still long, the same deadlock is aimed at as below, with bounded work;
 //! 3. downhill: of all targets the one that differs from M0 in the fewest places is aimed at, and fired is what makes the
 //!    difference smaller without leaving the markings from which the target can be reached. So the walk never goes
 //!    astray for good; where nothing makes the difference smaller, a bounded search by the smallest difference looks for
 //!    a marking that is nearer;
 //! 4. the layers again, with no bound but memory and time.
+//!
+//! What the second and the third find is kept, and comes before them where it leads into other targets as well.
 //!
 //! The rejected alternative, to keep in every node how far it is from M0 (edge-valued diagrams), gives shortest sequences by
 //! saturation, at a multiple of the nodes for every net that no sequence is asked of.
@@ -38,6 +41,8 @@ const IN_VAIN: u64 = 8;
 /// The firings that are drawn at random, all together, and how many deadlocks that are no targets they may end in.
 const DRAWN_MAX: u64 = 1 << 22;
 const OTHERS_MAX: u64 = 1 << 8;
+/// A sequence that was drawn is taken as it is if it has at most so many times the firings that are needed at least.
+const HARDLY_LONGER: usize = 2;
 /// The part of the memory that the masks of the net may take for them.
 const MASKS_SHARE: usize = 8;
 /// The markings that one search for a way out of a hollow may look at.
@@ -53,6 +58,17 @@ pub struct Walk {
     /// Whether no other sequence into the targets is shorter.
     pub shortest: bool,
 }
+
+/// What a search downhill may take: results of the diagram, markings in all hollows, and fewer firings than these.
+#[derive(Clone, Copy)]
+struct Effort {
+    results: u64,
+    markings: usize,
+    firings: usize,
+}
+
+/// Whatever it takes; each hollow has its own bound all the same.
+const NO_END: Effort = Effort { results: u64::MAX, markings: usize::MAX, firings: usize::MAX };
 
 /// A marking: for each level from 1 whether its place holds a token.
 pub(super) type Marking = Vec<bool>;
@@ -137,21 +153,37 @@ impl Symbolic {
         let moves = Moves::of(self);
         let held = [roots, &[targets]].concat();
         if self.all(&held, targets, Events::Tests, watch)? == EMPTY {
-            if let Some(walk) = self.by_layers(roots, targets, &moves, self.layers_work / IN_VAIN, watch)? {
+            if let Some(walk) = self.by_some_layers(roots, targets, &moves, self.layers_work / IN_VAIN, watch)? {
+                return Ok(Some(walk));
+            }
+            if let Some(walk) = self.known(targets) {
                 return Ok(Some(walk));
             }
             if let Some(walk) = self.at_random(targets, &moves, watch)? {
+                let walk = self.shortened(roots, walk, &moves, watch)?;
+                self.walks.push(walk.clone());
                 return Ok(Some(walk));
             }
         }
-        if let Some(walk) = self.by_layers(roots, targets, &moves, self.layers_work, watch)? {
+        if let Some(walk) = self.by_some_layers(roots, targets, &moves, self.layers_work, watch)? {
             return Ok(Some(walk));
         }
         self.layers_work = (self.layers_work / IN_VAIN).max(LAYERS_WORK_LEAST);
+        if let Some(walk) = self.known(targets) {
+            return Ok(Some(walk));
+        }
         match self.downhill(roots, targets, &moves, watch)? {
-            Some(walk) => Ok(Some(walk)),
+            Some(walk) => {
+                self.walks.push(walk.clone());
+                Ok(Some(walk))
+            }
             None => self.by_layers(roots, targets, &moves, u64::MAX, watch),
         }
+    }
+
+    /// A sequence that was found when others were asked for, if it leads into these: verdicts ask for sets that are alike.
+    fn known(&self, targets: Node) -> Option<Walk> {
+        self.walks.iter().find(|walk| self.contains(targets, &walk.reached)).cloned()
     }
 
     /// A sequence of firings that are drawn, if it comes to one of these deadlocks soon.
@@ -197,6 +229,21 @@ impl Symbolic {
         let mut reached: Vec<u32> = marked.map(|level| self.place_at()[level]).collect();
         reached.sort_unstable();
         Walk { firings, reached, shortest }
+    }
+
+    /// The same by the layers that so much work makes, and for which there is memory: other ways need less.
+    fn by_some_layers(
+        &mut self,
+        roots: &[Node],
+        targets: Node,
+        moves: &Moves,
+        work: u64,
+        watch: &mut Watch<'_>,
+    ) -> Result<Option<Walk>, Stop> {
+        match self.by_layers(roots, targets, moves, work, watch) {
+            Err(Stop::Memory) => Ok(None),
+            result => result,
+        }
     }
 
     fn by_layers(
@@ -255,6 +302,19 @@ impl Symbolic {
         Ok(self.walk(firings, &walk_end, true))
     }
 
+    /// A sequence to where one leads that was drawn, or that one, if it is hardly longer than what differs there demands.
+    fn shortened(&mut self, roots: &[Node], walk: Walk, moves: &Moves, watch: &mut Watch<'_>) -> Result<Walk, Stop> {
+        let mut end = self.first();
+        walk.firings.iter().for_each(|&t| moves.flip(t as usize, &mut end));
+        let differ = self.first().iter().zip(&end).filter(|(a, b)| a != b).count();
+        let most = (0..moves.len()).map(|t| moves.flipped(t).count()).max().unwrap_or(0).max(1);
+        if walk.firings.len() <= HARDLY_LONGER * differ.div_ceil(most) {
+            return Ok(walk);
+        }
+        let effort = Effort { results: LAYERS_WORK, markings: HOLLOW_MAX, firings: walk.firings.len() };
+        Ok(self.toward(roots, end, moves, effort, watch)?.unwrap_or(walk))
+    }
+
     fn downhill(
         &mut self,
         roots: &[Node],
@@ -262,14 +322,28 @@ impl Symbolic {
         moves: &Moves,
         watch: &mut Watch<'_>,
     ) -> Result<Option<Walk>, Stop> {
-        let mut marking = self.first();
-        let aim = self.nearest(targets, &marking, watch)?;
+        let aim = self.nearest(targets, &self.first(), watch)?;
+        self.toward(&[roots, &[targets]].concat(), aim, moves, NO_END, watch)
+    }
+
+    /// A sequence to one marking, which is reachable; None where the search is given up.
+    fn toward(
+        &mut self,
+        roots: &[Node],
+        aim: Marking,
+        moves: &Moves,
+        mut effort: Effort,
+        watch: &mut Watch<'_>,
+    ) -> Result<Option<Walk>, Stop> {
         let places: Vec<u32> = (1..aim.len()).filter(|&level| aim[level]).map(|level| self.place_at()[level]).collect();
-        let held = [roots, &[targets]].concat();
-        let aimed = self.single(&held, &places)?;
-        let held = [held, vec![aimed]].concat();
-        let leading = self.closure(&held, aimed, self.reach, By::Backward, watch)?;
+        let aimed = self.single(roots, &places)?;
+        let held = [roots, &[aimed]].concat();
+        let Some(leading) = self.closure_within(&held, (aimed, self.reach), By::Backward, effort.results, watch)?
+        else {
+            return Ok(None);
+        };
         debug_assert!(leading != EMPTY && self.reach != ANY);
+        let mut marking = self.first();
         let mut firings = Vec::new();
         loop {
             let before = firings.len();
@@ -285,11 +359,15 @@ impl Symbolic {
                     }
                 }
             }
+            if firings.len() >= effort.firings {
+                return Ok(None);
+            }
             if marking == aim {
                 return Ok(Some(self.walk(firings, &aim, false)));
             }
             if firings.len() == before {
-                let Some(way) = self.out_of_hollow(&marking, &aim, leading, moves, watch)? else { return Ok(None) };
+                let way = self.out_of_hollow(&marking, &aim, leading, moves, &mut effort.markings, watch)?;
+                let Some(way) = way else { return Ok(None) };
                 for &t in &way {
                     moves.flip(t as usize, &mut marking);
                 }
@@ -298,13 +376,15 @@ impl Symbolic {
         }
     }
 
-    /// A sequence to a marking that differs less from the aim; None where the search for it is given up.
+    /// A sequence to a marking that differs less from the aim; None where the search for it is given up. Of the markings
+    /// that are `left` to look at those are taken that it has found.
     fn out_of_hollow(
         &mut self,
         from: &Marking,
         aim: &Marking,
         leading: Node,
         moves: &Moves,
+        left: &mut usize,
         watch: &mut Watch<'_>,
     ) -> Result<Option<Vec<u32>>, Stop> {
         let differ = |marking: &Marking| marking.iter().zip(aim).filter(|(a, b)| a != b).count();
@@ -335,7 +415,8 @@ impl Symbolic {
                     way.reverse();
                     return Ok(Some(way));
                 }
-                if found.len() == HOLLOW_MAX {
+                *left = left.saturating_sub(1);
+                if found.len() == HOLLOW_MAX || *left == 0 {
                     return Ok(None);
                 }
                 queue.push((Reverse(distance), Reverse(found.len() - 1)));
