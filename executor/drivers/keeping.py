@@ -261,8 +261,9 @@ class Kept:
 
     async def _connected(self) -> None:
         """One connection, from its making to its failure or to the stop."""
-        connecting = self.kind.connect(self.options, self.wanted)
-        connection = await asyncio.wait_for(connecting, 2 * self.document.timeout_s)
+        # In this task: one of its own would be left behind by who is cancelled twice, with an error nobody hears of.
+        async with asyncio.timeout(2 * self.document.timeout_s):
+            connection = await self.kind.connect(self.options, self.wanted)
         try:
             self.is_connected = True
             await self._first_of(self._serve(connection), self._watch())

@@ -199,6 +199,7 @@ class ModbusConnection(Stepwise):
             try:
                 if (first := next(questions, None)) is not None:
                     begun = first, self.ask(first)
+                    begun[1].add_done_callback(_heard)
             except LinkError:
                 questions = self._questions(writes)  # who waits is told
         return self._written(begun, questions, self.withheld)
@@ -332,6 +333,12 @@ class ModbusConnection(Stepwise):
             return _Question(request, what)
         numbers = [number & 0xFFFF for number in numbers]
         return _Question(self.requests.write_registers(first.number, numbers, device_id=self.unit), what)
+
+
+def _heard(answer: asyncio.Future[Any]) -> None:
+    """Hear of an error also where who was to wait for it is gone: it fails with the connection, which others tell."""
+    if not answer.cancelled():
+        answer.exception()
 
 
 def _requests() -> ModbusClientMixin[ModbusPDU]:

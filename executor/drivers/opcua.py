@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from firable.executor.drivers.cancelling import ended
 from firable.executor.drivers.device import (
     Connection,
     File,
@@ -136,6 +137,7 @@ class OpcUaConnection(Stepwise):
             if transport is not None:
                 transport.abort()  # before asyncua, which would send what it still has
             self.client.disconnect_socket()
+            await ended(self._tasks)
 
     def datachange_notification(self, node: Node, value: Any, data: Any) -> None:
         """The subscription tells of a change (called by asyncua)."""
@@ -158,6 +160,18 @@ class OpcUaConnection(Stepwise):
     def _transport(self) -> asyncio.Transport | None:
         protocol = self.client.uaclient.protocol
         return None if protocol is None else protocol.transport
+
+    @property
+    def _tasks(self) -> list[asyncio.Task[Any]]:
+        """What asyncua does beside: it ends that with a goodbye alone, and else publishes and renews for ever."""
+        client, session = self.client, self.client.uaclient.session
+        several = (
+            client._stale_watchdog_task,
+            client._supervisor_task,
+            client._renew_channel_task,
+            session._publish_task,
+        )
+        return [task for task in several if task is not None]
 
     async def _write(self, writes: Writes, withheld: int) -> None:
         from asyncua import ua
