@@ -184,6 +184,7 @@ class Mqtt:
             tls_params=tls,
             socket_options=[DROPPING],
         )
+        client._client.connect_timeout = wanted.timeout_s  # of a thread that no cancellation ends, nor a stop before it
         connection = MqttConnection(client, wanted)
         try:
             await connection.open()

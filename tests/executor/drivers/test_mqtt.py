@@ -2,6 +2,8 @@
 
 import asyncio
 import os
+import socket
+import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -13,7 +15,7 @@ from firable.executor.drivers.bench import Far, Heard, until
 from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.bound import BoundDriver
 from firable.executor.drivers.conformance import DriverConformance
-from firable.executor.drivers.device import Point, Value, Wanted
+from firable.executor.drivers.device import LinkError, Point, Value, Wanted
 from firable.executor.drivers.far_side.ends import PORTS
 from firable.executor.drivers.far_side.machine import ROLES
 from firable.executor.drivers.far_side.mqtt_device import MqttEnd, mosquitto
@@ -72,6 +74,29 @@ def test_a_connection_that_is_given_up_before_a_frozen_broker_has_answered_leave
         return left
 
     assert asyncio.run(main()) == []
+
+
+def test_broker_that_no_packet_reaches_is_not_waited_for_beyond_the_attempt_to_connect() -> None:
+    """The attempt is made by a thread, for whose end the event loop waits at its own."""
+    waiting: list[socket.socket] = []
+    with socket.socket() as listening:
+        listening.bind(("127.0.0.1", 0))
+        listening.listen(0)
+        for _ in range(4):  # until no more are let in, and what comes is dropped
+            waiting.append(one := socket.socket())
+            one.setblocking(False)
+            one.connect_ex(listening.getsockname())
+
+        async def main() -> None:
+            options = MqttOptions(host="127.0.0.1", port=listening.getsockname()[1])
+            with pytest.raises(LinkError, match="timed out"):
+                await KIND.connect(options, Wanted(("cell/key",), timeout_s=0.3))
+
+        begun = time.monotonic()
+        asyncio.run(main())
+        assert time.monotonic() - begun < 4
+    for one in waiting:
+        one.close()
 
 
 @needs_mosquitto
