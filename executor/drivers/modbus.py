@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final, Literal
 
 from pydantic import Field
 
+from firable.executor.drivers.addresses import HostName, LinePath
 from firable.executor.drivers.device import (
     Connection,
     LinkError,
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 class TcpOptions(Options):
     """A device in a network."""
 
-    host: str
+    host: HostName
     port: int = Field(default=502, ge=1, le=65_535)
     unit: int = Field(default=1, ge=0, le=255)
     every_s: float = Field(default=0.01, ge=0, le=60, allow_inf_nan=False)
@@ -42,7 +43,7 @@ class TcpOptions(Options):
 class RtuOptions(Options):
     """A device on a serial line."""
 
-    port: str
+    port: LinePath
     baud: int = Field(default=19_200, ge=300, le=4_000_000)
     parity: Literal["N", "E", "O"] = "E"
     stop_bits: Literal["1", "2"] = "1"

@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING, Final
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from firable.executor.drivers.addresses import HostName
 from firable.executor.drivers.device import (
     DROPPING,
     Connection,
@@ -65,7 +66,7 @@ class MqttTls(BaseModel):
 class MqttOptions(Options):
     """A broker; `tls: true` trusts the authorities that the system trusts."""
 
-    host: str
+    host: HostName
     port: int = Field(default=1883, ge=1, le=65_535)
     user: str | None = None
     password: Password = None

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from firable.executor.drivers.addresses import OpcUaUrl
 from firable.executor.drivers.cancelling import ended
 from firable.executor.drivers.device import (
     Connection,
@@ -69,7 +70,7 @@ class OpcUaSecurity(BaseModel):
 class OpcUaOptions(Options):
     """A server, and how often it looks at its nodes and tells of them."""
 
-    url: str
+    url: OpcUaUrl
     every_s: float = Field(default=0.01, gt=0, le=60, allow_inf_nan=False)
     user: str | None = None
     password: Password = None

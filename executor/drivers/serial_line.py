@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Final
 
 from pydantic import Field
 
+from firable.executor.drivers.addresses import LinePath
 from firable.executor.drivers.device import (
     Connection,
     LinkError,
@@ -48,7 +49,7 @@ _QUESTIONS: Final = itertools.count(1)
 class SerialOptions(Options):
     """A port, and after how long a silence somebody is asked for."""
 
-    port: str
+    port: LinePath
     baud: int = Field(default=115_200, ge=300, le=4_000_000)
     every_s: float = Field(default=1.0, gt=0, le=60, allow_inf_nan=False)
 

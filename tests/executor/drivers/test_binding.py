@@ -108,11 +108,60 @@ def test_a_right_binding_is_read_and_fits(tmp_path: Path) -> None:
         ("read: discrete 0, ", "", ("F1009", "14: M.there")),
         ("invert: true", "invert: 2", ("F1010", "14: 2")),
         (MODBUS, "driver: mqtt\n    host: broker\n    password: secret", ("F1010", "7: password")),
-        (MODBUS, "driver: opcua\n    url: opc.tcp://plc\n    password: secret", ("F1010", "7: password")),
+        (MODBUS, "driver: opcua\n    url: opc.tcp://plc:4840\n    password: secret", ("F1010", "7: password")),
     ],
 )
 def test_what_is_no_binding_is_refused_where_it_stands(old: str, new: str, found: tuple[str, str]) -> None:
     assert found in refusal(edited(old, new))
+
+
+@pytest.mark.parametrize(
+    ("keys", "hint"),
+    [
+        ("driver: opcua\n    url: opc.tc://plc:4840", "did you mean 'opc.tcp'? write it such as"),
+        ("driver: opcua\n    url: opc.tcp:/plc:4840", "write it such as `opc.tcp://192.168.0.10:4840/`"),
+        ("driver: opcua\n    url: plc:4840", "write it such as"),
+        ("driver: opcua\n    url: opc.tcp://plc", "write it such as"),
+        ("driver: opcua\n    url: opc.tcp://plc:484O", "write it such as"),
+        ("driver: opcua\n    url: opc.tcp://:4840", "write it such as"),
+        ("driver: opcua\n    url: 'opc.tcp://[::1:4840'", "write it such as"),
+        ("driver: mqtt\n    host: mqtt://broker", "write `host: broker`"),
+        ("driver: mqtt\n    host: mqtt://broker:1884/cell", "write `host: broker` and `port: 1884`"),
+        ("driver: mqtt\n    host: ''", "write the name or the address of a host"),
+        ("driver: mqtt\n    host: the broker", "write the name or the address of a host"),
+        ("driver: modbus-tcp\n    host: 10.0.0.1:503", "write `host: 10.0.0.1` and `port: 503`"),
+        ("driver: modbus-tcp\n    host: '[fe80::1]'", "write `host: fe80::1`"),
+        ("driver: modbus-tcp\n    host: 10.0.0.256", "write the name or the address of a host"),
+        ("driver: modbus-tcp\n    host: 10.0.1", "write the name or the address of a host"),
+        ("driver: modbus-rtu\n    port: ttyUSB0", "write a path such as `/dev/ttyUSB0`"),
+        ("driver: serial\n    port: 9600", "write a path such as"),
+        ("driver: serial\n    port: socket://plc:7000", "write a path such as"),
+    ],
+)
+def test_address_at_which_no_device_can_be_is_refused_where_it_stands(keys: str, hint: str) -> None:
+    with pytest.raises(InputError) as refused:
+        parse_binding(edited(MODBUS, keys))
+    first = refused.value.diagnostics[0]
+    assert (first.code, first.hint[: len(hint)]) == ("F1010", hint)
+    assert first.span is not None
+    assert first.span.line == 6
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        "driver: opcua, url: 'opc.tcp://plc-1.cell:4840/firable/server'",
+        "driver: opcua, url: 'OPC.TCP://[fe80::1]:4840'",
+        "driver: opcua, url: 'opc.tcp://user:word@10.0.0.1:4840/'",
+        "driver: mqtt, host: broker_1",
+        "driver: mqtt, host: 'fe80::1%eth0'",
+        "driver: modbus-tcp, host: müller.example.",
+        "driver: modbus-rtu, port: ./line",
+        "driver: serial, port: /dev/serial/by-id/usb-FTDI_FT232R-if00-port0",
+    ],
+)
+def test_address_at_which_a_device_may_be_is_taken(keys: str) -> None:
+    parse_binding(f"firable_bind: 1\ncell: c\ndevices:\n  plc: {{{keys}}}\n")
 
 
 def test_an_unknown_key_of_a_device_is_told_with_the_keys_of_its_driver() -> None:

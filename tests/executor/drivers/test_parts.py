@@ -311,7 +311,7 @@ def test_simulated_driver_shows_its_image_and_says_what_became_of_a_command() ->
     [
         ("pymodbus", "driver: modbus-tcp, host: localhost"),
         ("serial", "driver: modbus-rtu, port: /dev/ttyS0"),
-        ("asyncua", "driver: opcua, url: 'opc.tcp://localhost/'"),
+        ("asyncua", "driver: opcua, url: 'opc.tcp://localhost:4840/'"),
         ("aiomqtt", "driver: mqtt, host: localhost"),
         ("serial", "driver: serial, port: /dev/ttyS0"),
     ],
