@@ -59,6 +59,9 @@ def live_io(
     --send this is the master of the devices: it gives them their heartbeats, and drives the safe outputs at both ends.
     Never do that beside a running cell.
 
+    --once waits for all devices at the same time, for each as long as its `start_s` says, and names those that do not
+    answer.
+
     Ctrl-C ends it. Exit codes: 0, or 1 where a machine was stopped or has failed at what was sent, 2 for a binding that
     cannot be used, and 3 where --once cannot read something.
     """
@@ -279,10 +282,13 @@ async def _connected(driver: BoundDriver, running: asyncio.Task[None]) -> bool:
     """Wait until every device has been read, as long as its start may take; whether all were."""
     import asyncio
 
-    for device in driver.devices.values():
-        ready = asyncio.create_task(device.is_ready.wait())
-        await asyncio.wait([ready, running], timeout=device.document.start_s, return_when=asyncio.FIRST_COMPLETED)
-        ready.cancel()
-        if running.done():
-            running.result()
+    from firable.executor.drivers.cancelling import ended
+
+    met = asyncio.create_task(driver.met())
+    try:
+        await asyncio.wait([met, running], return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        await ended([met])
+    if running.done():
+        running.result()
     return all(device.is_ready.is_set() for device in driver.devices.values())

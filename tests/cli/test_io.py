@@ -5,6 +5,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.resources import files
@@ -144,6 +145,22 @@ def test_looking_writes_nothing_and_sending_by_hand_is_for_what_the_binding_allo
     assert main([*sending, "robot.to_cv1"]) == 2
     assert main([*sending, "robot.back"]) == 0
     assert cell.line_with(" R ").strip().endswith("R MOVE to=HOME")
+
+
+def test_devices_that_do_not_answer_are_waited_for_together_and_each_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = [f"line{i}" for i in range(40)]
+    device = "driver: serial, port: /dev/nobody-is-here, start_s: 0.5"
+    lines = ["firable_bind: 1", "cell: dark", "devices:", *(f"  {name}: {{{device}}}" for name in names), "signals:"]
+    bind = tmp_path / "dark.bind.yaml"
+    bind.write_text("\n".join([*lines, *(f"  s.{name}: {{device: {name}, read: s}}" for name in names), ""]))
+    begun = time.monotonic()
+    assert main(["io", str(bind), "--once"]) == 3
+    assert time.monotonic() - begun < len(names) * 0.5
+    said = capsys.readouterr()
+    assert said.out.count("not reached since the start") == len(names)
+    assert [name for name in names if f"{name}: not connected: /dev/nobody-is-here: " not in said.err] == []
 
 
 def test_a_net_whose_commands_are_not_sent_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
