@@ -45,10 +45,7 @@ class TestOpcUa(DriverConformance):
 
     def test_a_node_that_the_server_has_not_is_named_when_it_is_to_be_written(self) -> None:
         async def main() -> None:
-            if not self.end.port:
-                await self.end.start(lambda _point, _value: None)
-            else:
-                await self.end.mend()
+            await self.end.start(lambda _point, _value: None)
             options = OpcUaOptions(url=f"opc.tcp://127.0.0.1:{self.end.port}/")
             connection = await KIND.connect(options, Wanted((POINTS["sensor"],), 10.0))
             with pytest.raises(LinkError, match=r"not let .ns=2;s=M\.numbr. be written: .*BadNodeIdUnknown"):
