@@ -47,7 +47,10 @@ def bound_driver(binding: Binding, net: Net, part: Net | None = None, *, latched
 
 
 class BoundDriver:
-    """The driver of a binding. `completions` are the signals that it forms, `answered` the places that wait for one."""
+    """The driver of a binding. `completions` are the signals that it forms, `answered` the places that wait for one.
+
+    Raises `ModuleNotFoundError` where the library of a device is not installed.
+    """
 
     def __init__(
         self, binding: Binding, completions: Collection[str], answered: frozenset[str], *, latched: bool = False
@@ -59,6 +62,8 @@ class BoundDriver:
         self.answered = answered
         self.completing: dict[str, str] = {}
         """The completion of each place that has been commanded or asked about."""
+        for name in document.devices:  # before an event loop runs, which it would hold up for seconds
+            binding.kinds[name].load()
         self.devices = {name: BoundDevice(self, name) for name in document.devices}
         self.contacts = [device.contacts for device in self.devices.values()]
         self.clock: Clock | None = None
@@ -112,8 +117,6 @@ class BoundDriver:
     async def run(self, clock: Clock, listener: Listener) -> None:
         """Serve the devices until cancelled; on the way out the safe outputs are driven."""
         self.clock, self.listener = clock, listener
-        for name in self.devices:
-            self.binding.kinds[name].load()
         if isinstance(listener, Cautious):
             await listener.let_drive()
         self.has_begun = True

@@ -69,7 +69,11 @@ def run_to_the_end(
     if virtual:
         situation: Situation = run_in_virtual_time(terminable(host))
         return situation
-    work = terminable(host) if service is None or figures is None else _serving(host, service, figures)
+    if service is None or figures is None:
+        work = terminable(host)
+    else:
+        page = None if service.page is None else service.page(host)  # before the loop begins, which it would hold up
+        work = _serving(host, service, figures, page)
     guard = Guard(host.patience.seconds)
     try:
         with _short_collections(), asyncio.Runner(loop_factory=partial(_loop_for, host)) as runner:
@@ -166,7 +170,7 @@ class Inputs:
         self.counted = now
 
 
-async def _serving(host: Host, service: Service, figures: Metrics) -> Situation:
+async def _serving(host: Host, service: Service, figures: Metrics, page: Page | None = None) -> Situation:
     from firable.executor.operating.control import serving
 
     inputs = Inputs(host, figures)
@@ -175,7 +179,6 @@ async def _serving(host: Host, service: Service, figures: Metrics) -> Situation:
         inputs.look()
         return figures.text()
 
-    page = None if service.page is None else service.page(host)
     host.served = True
     async with serving(host, service.endpoint, text, page) as address:
         service.served(address)

@@ -13,6 +13,8 @@ from firable.executor.drivers.binding import parse_binding, read_binding
 from firable.executor.drivers.bound import BoundDriver, bound_driver
 from firable.executor.drivers.device import files_of
 from firable.executor.drivers.far_side.ends import ends_of
+from firable.executor.drivers.modbus import ModbusTcp
+from firable.executor.drivers.opcua import OpcUa
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.diagnostics import InputError
 from firable.nets.text import parse_net
@@ -334,6 +336,16 @@ def test_the_binding_of_the_catalogue_fits_its_net_and_can_be_served() -> None:
     binding = read_binding(catalogue_path("one_robot").with_name("one_robot.bind.yaml"))
     driver = bound_driver(binding, catalogue_net("one_robot"))
     assert set(driver.devices) == set(ends_of(binding)) == {"modbus", "opcua"}
+
+
+def test_libraries_of_devices_are_there_before_an_event_loop_waits_for_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The import of asyncua takes seconds on a busy machine, which stood in the log as a process that did not run."""
+    loaded: list[str] = []
+    for kind in (ModbusTcp, OpcUa):
+        monkeypatch.setattr(kind, "load", lambda self: loaded.append(type(self).__name__))
+    binding = read_binding(catalogue_path("one_robot").with_name("one_robot.bind.yaml"))
+    bound_driver(binding, catalogue_net("one_robot"))
+    assert sorted(loaded) == ["ModbusTcp", "OpcUa"]
 
 
 def test_a_driver_of_others_is_found_by_its_entry_point(monkeypatch: pytest.MonkeyPatch) -> None:
