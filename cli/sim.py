@@ -75,7 +75,8 @@ def sim(
     """Serve the machines of NET, with workpieces and jitter, to whoever connects: `firable run BUNDLE --bind FILE`.
 
     The machines are dealt out to the protocols that are named, on ports of this host, and where everything is stands in
-    the binding that is written. Without protocols, --bind is read, and what it leads to on this host is served.
+    the binding that is written. Without protocols, --bind is read, and what it leads to on this host is served: each
+    machine by the protocol of its device there, a serial line by a link to a pseudo-terminal at the path of its port.
 
     It ends by Ctrl-C. When something collides its machines stand, and show that they have failed at what they did; the
     exit code is 1 then. N in --drop and --hang says which time, from 1.
@@ -134,7 +135,7 @@ async def _bound(
     _refuse_what_is_not_ours(path)
     ends: dict[str, FarEnd] = {}
     ports = {name: PORTS[name] for name in protocols}
-    if "serial" in protocols:
+    if "serial" in protocols:  # the name of the line is the system's, so it is there before the binding
         from firable.executor.drivers.far_side.serial_device import SerialEnd
 
         line = ends["serial"] = SerialEnd()

@@ -20,6 +20,7 @@ from support.waiting import PATIENCE_SECONDS, heard_in_time
 from firable.cli.main import main
 from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.far_side.ends import PORTS, binding_text
+from firable.executor.drivers.far_side.mqtt_device import mosquitto
 from firable.executor.drivers.far_side.ports import free_port
 from firable.executor.drivers.fitting import misfits
 from firable.nets.catalogue import catalogue_net, catalogue_path
@@ -204,6 +205,40 @@ def test_bundle_runs_on_the_machines_of_a_binding_until_it_is_stopped(cell: Cell
     assert replay(NET, read_trace(trace)).complete
 
 
+@pytest.mark.skipif(mosquitto() is None, reason="needs the broker mosquitto, which is not installed")
+def test_binding_by_hand_with_each_machine_behind_a_protocol_of_its_own_is_served_and_run(tmp_path: Path) -> None:
+    lines = [tmp_path / "robot.line", tmp_path / "conveyor.line"]
+    ports = {"modbus": str(free_port()), "opcua": str(free_port()), "mqtt": str(free_port()), "serial": str(lines[1])}
+    text = unhurried(binding_text(NET, ports, SENSORS))
+    tcp = f"driver: modbus-tcp\n    host: 127.0.0.1\n    port: {ports['modbus']}"
+    broker = "driver: mqtt\n    host: 127.0.0.1"
+    sensor = "read: sensors/conveyor.part_at_exit"
+    for was, is_now in (
+        (tcp, f"driver: modbus-rtu\n    port: {lines[0]}\n    parity: N"),
+        (broker, f"{broker}\n    alive: {{read: cell/life, within_s: 10}}"),
+        (sensor, f"{sensor}, edges: edges/conveyor.part_at_exit"),
+    ):
+        assert text.count(was) == 1
+        text = text.replace(was, is_now)
+    bind, bundle = tmp_path / "own.bind.yaml", tmp_path / "cell.bundle"
+    bind.write_text(text)
+    lines[0].symlink_to(tmp_path / "a line whose process was killed")
+    assert main(["bundle", "catalogue:one_robot", "-o", str(bundle)]) == 0
+    serving = firable("sim", "catalogue:one_robot", "--bind", str(bind), "--workpieces", "1", "--speed", "10")
+    served = Cell(serving, bind)
+    try:
+        served.line_with("serving 'one-robot'")
+        running = firable("run", str(bundle), "--bind", str(bind))
+        served.line_with("workpiece 1 is carried out")
+        running.send_signal(signal.SIGINT)
+        said, _ = running.communicate(timeout=PATIENCE_SECONDS)
+        assert running.returncode == 0, said
+    finally:
+        serving.terminate()
+        serving.communicate(timeout=PATIENCE_SECONDS)
+    assert [path for path in lines if path.is_symlink()] == []
+
+
 ARM = """
 firable: 1
 cell: arm
@@ -318,13 +353,58 @@ def test_a_binding_that_is_made_fits_its_net_whatever_that_has(path: Path) -> No
     )
 
 
-def test_device_that_cannot_be_served_here_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def beyond(text: str, keys: str) -> str:
+    """A binding of `binding_text` with other keys of its one device."""
+    head, _, rest = text.partition("    driver: ")
+    _, _, rest = rest.partition("    heartbeat:")
+    return f"{head}{keys}    heartbeat:{rest}"
+
+
+@pytest.mark.parametrize(
+    ("protocol", "keys", "why"),
+    [
+        ("modbus", "    driver: modbus-tcp\n    host: 10.0.0.1\n", "'modbus' is at 10.0.0.1, and a cell is served at"),
+        (
+            "mqtt",
+            "    driver: mqtt\n    host: localhost\n    tls: true\n",
+            "'mqtt' has `tls`, and a simulated cell neither",
+        ),
+        ("opcua", "    driver: opcua\n    url: opc.tcp://plc:4840/\n", "'opcua' is at plc, and a cell is served at"),
+        (
+            "serial",
+            "    driver: serial\n    port: {file}\n",
+            "serial: {file} cannot be made to lead to a line: File exists",
+        ),
+        (
+            "modbus",
+            "    driver: modbus-rtu\n    parity: N\n    port: {file}/x\n",
+            "modbus: {file}/x cannot be made to lead to a line: ",
+        ),
+        (
+            "modbus",
+            "    driver: modbus-rtu\n    port: ./line\n",
+            "'modbus' has the parity E, and a pseudo-terminal has none",
+        ),
+        ("serial", "    driver: simulated\n", "`driver: simulated` leads to nothing that can be served on this host"),
+    ],
+)
+def test_device_that_nobody_would_reach_here_is_refused(
+    protocol: str, keys: str, why: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     bind = tmp_path / "c.bind.yaml"
-    bind.write_text(binding_text(NET, {"serial": "/dev/ttyS0"}, SENSORS))
+    bind.write_text(
+        beyond(binding_text(NET, {protocol: "15020"}, SENSORS), keys.format(file=bind)).replace("15020", "./x")
+    )
+    before = bind.read_text()
     assert main(["sim", "catalogue:one_robot", "--bind", str(bind)]) == 2
     said = capsys.readouterr().err
-    assert "error[F5104]: `driver: serial` leads to nothing that can be served" in said
-    assert "name the protocols again, as --serial" in said
+    assert "error[F5104]" in said
+    assert why.format(file=bind) in said
+    assert bind.read_text() == before
+
+
+def test_port_that_is_taken_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bind = tmp_path / "c.bind.yaml"
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()

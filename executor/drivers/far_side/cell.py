@@ -3,26 +3,32 @@
 What the executor meets here is what it would meet on the floor: sockets, times, jitter, machines that are watched by
 their devices. A device takes a command when its number comes and knows which one by what was written before it, as a
 program in it would; it shows the numbers that it has taken and done; it stops its machines when a safe output is
-written, and when its heartbeat stays away for `BEATS_MISSED` of its periods. The cell does not know the net beyond the
-commands of its places, and learns of no firing.
+written, and when its heartbeat stays away for `BEATS_MISSED` of its periods; it gives the sign of life that is asked of
+it, and counts the edges of its sensors. The cell does not know the net beyond the commands of its places, and learns of
+no firing.
 """
 
 from __future__ import annotations
 
 import asyncio
+import itertools
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Final
 
 from firable.executor.cell.plant import CommandDone, Plant, PlantFault, PlantReport, SensorChanged
-from firable.executor.drivers.binding import Binding, ChannelDocument, DeviceDocument, writes
+from firable.executor.drivers.binding import AliveDocument, Binding, ChannelDocument, DeviceDocument, writes
 from firable.executor.drivers.cancelling import ended
 from firable.executor.drivers.device import Point, Value, as_bit, as_number
 from firable.executor.drivers.far_side.end import Dependent, FarEnd, GoneError
+from firable.executor.drivers.keeping import BEATS
 from firable.nets.net import Command, Net
 
 BEATS_MISSED: Final = 5
+
+SIGNS: Final = 4
+"""How often a sign of life changes in the time within which it must."""
 
 
 @dataclass
@@ -80,6 +86,8 @@ class CellServer:
         self.tickets: dict[int, tuple[_Device, _Channel, int]] = {}
         self.at: dict[str, tuple[_Device, _Channel, int]] = {}
         """What each machine is at."""
+        self.edges = dict.fromkeys(binding.document.signals, -1)
+        """How often each signal has changed, since it was first shown."""
         self.next_ticket = 0
         self.begun_seconds = 0.0
         self.delivered = self.befallen = 0
@@ -127,7 +135,8 @@ class CellServer:
         Raises `GoneError`, with the names of its devices, where an end is without what it needs.
         """
         lasting = [self._gone(end, devices) for end, devices in self._ends() if isinstance(end, Dependent)]
-        works = [asyncio.create_task(work) for work in (self._happening(), *lasting)]
+        living = [self._living(one, one.document.alive) for one in self.devices.values() if one.document.alive]
+        works = [asyncio.create_task(work) for work in (self._happening(), *lasting, *living)]
         try:
             done, _ = await asyncio.wait(works, return_when=asyncio.FIRST_COMPLETED)
             for work in done:
@@ -146,6 +155,12 @@ class CellServer:
                 await asyncio.wait_for(self.awake.wait(), delay)
             except TimeoutError:
                 continue
+
+    async def _living(self, device: _Device, alive: AliveDocument) -> None:
+        """Change the sign of life of a device, in the time of whoever watches it."""
+        for count in itertools.count():
+            self._show(device, alive.read, count % BEATS)
+            await asyncio.sleep(alive.within_s / SIGNS)
 
     async def _gone(self, end: Dependent, devices: list[_Device]) -> None:
         try:
@@ -245,7 +260,10 @@ class CellServer:
     def _sensor(self, signal: str) -> None:
         bound = self.binding.document.signals.get(signal)
         if bound is not None:
-            self.devices[bound.device].end.show(bound.read, self.plant.shown[signal] ^ bound.invert)
+            device = self.devices[bound.device]
+            device.end.show(bound.read, self.plant.shown[signal] ^ bound.invert)
+            self.edges[signal] += 1
+            self._show(device, bound.edges, self.edges[signal] % BEATS)
 
     def _beaten(self, device: _Device, every_s: float) -> None:
         if device.watchdog is not None:

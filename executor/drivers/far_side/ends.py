@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
+from urllib.parse import urlsplit
 
 from firable.executor.drivers.binding import Binding, writes
 from firable.executor.drivers.device import Point, Value
@@ -18,6 +19,9 @@ from firable.nets.net import Command, Net, Place, SignalKind
 
 PORTS: Final[dict[str, str]] = {"modbus": "15020", "opcua": "14840", "mqtt": "11883", "serial": ""}
 """The protocols, and the port of this host at which each is served; a serial line gets its name when it is made."""
+
+HERE: Final = "127.0.0.1"
+"""Where cells are served."""
 
 HEARTBEAT_S: Final = 0.2
 
@@ -130,38 +134,63 @@ def ends_of(binding: Binding) -> dict[str, FarEnd]:
     """The servers to which a binding leads, on this host; raises `InputError` F5104 for a device that has none.
 
     Devices at one address have one server: that of a Modbus gateway where they are several units, one device or one
-    broker that is reached by several connections else.
+    broker that is reached by several connections else. A serial line is one device's, and its path a link to a
+    pseudo-terminal while it is served.
     """
-    at: dict[int, list[str]] = {}
+    at: dict[int | str, list[str]] = {}
     for name in binding.document.devices:
         at.setdefault(_address(binding, name)[1], []).append(name)
     return {name: end for port, names in at.items() for name, end in _ends(binding, port, names).items()}
 
 
-def _address(binding: Binding, name: str) -> tuple[str, int]:
-    """The host and the port of a device."""
+def _address(binding: Binding, name: str) -> tuple[str, int | str]:
+    """The host and the port of a device; of one on a serial line no host, and a path."""
     options = binding.options[name].model_dump()
     host = options.get("host")
     match driver := binding.document.devices[name].driver:
         case "modbus-tcp" | "mqtt":
             port = options["port"]
         case "opcua":
-            host, _, port = str(options["url"]).rpartition("/" * 2)[2].partition("/")[0].rpartition(":")
+            parts = urlsplit(options["url"])
+            host, port = parts.hostname, parts.port
+        case "serial" | "modbus-rtu":
+            return "", str(options["port"])
         case _:
             message = f"`driver: {driver}` leads to nothing that can be served on this host"
             hint = "let the binding be made: name the protocols, such as --modbus --opcua"
-            if driver == "serial":
-                hint = "a serial line is made anew each time, with its binding: name the protocols again, as --serial"
             raise InputError([binding.problem("F5104", ("devices", name, "driver"), message, hint)])
-    return "127.0.0.1" if host == "localhost" else str(host), int(port)
+    return HERE if host == "localhost" else str(host), int(port)
 
 
-def _ends(binding: Binding, port: int, names: Sequence[str]) -> dict[str, FarEnd]:
+def _refuse_what_is_elsewhere(binding: Binding, name: str) -> None:
+    """Refuse (F5104) a device that nobody would reach where it is served, or as it is served."""
+    options = binding.options[name].model_dump()
+    host, _ = _address(binding, name)
+    if host not in {"", HERE}:
+        key, message = (
+            "url" if "url" in options else "host",
+            f"'{name}' is at {host}, and a cell is served at {HERE} alone",
+        )
+        hint = f"in a binding for the simulation, write {HERE}"
+    elif key := next((one for one in ("tls", "security") if options.get(one)), ""):
+        message = f"'{name}' has `{key}`, and a simulated cell neither encrypts nor knows who comes"
+        hint = f"leave `{key}` out of a binding for the simulation"
+    elif options.get("parity", "N") != "N":
+        key, message = "driver", f"'{name}' has the parity {options['parity']}, and a pseudo-terminal has none"
+        hint = "in a binding for the simulation, write `parity: N`"
+    else:
+        return
+    raise InputError([binding.problem("F5104", ("devices", name, key), message, hint)])
+
+
+def _ends(binding: Binding, port: int | str, names: Sequence[str]) -> dict[str, FarEnd]:
     """The ends of the devices at a port, of which each may be the end of several."""
     first, *others = names
     documents = binding.document.devices
     for name in others:
-        if documents[name].driver != documents[first].driver:
+        if isinstance(port, str):
+            why = "a serial line has one device"
+        elif documents[name].driver != documents[first].driver:
             why = "another protocol is spoken"
         elif _address(binding, name) != _address(binding, first):
             why = "another host is named"
@@ -169,8 +198,12 @@ def _ends(binding: Binding, port: int, names: Sequence[str]) -> dict[str, FarEnd
             continue
         message = f"'{name}' is at port {port}, where '{first}' is served, and {why}"
         raise InputError([binding.problem("F5104", ("devices", name), message, "give each a port of its own")])
+    for name in names:
+        _refuse_what_is_elsewhere(binding, name)
     points = {point: value for name in names for point, value in _points(binding, name).items()}
     end: FarEnd
+    if isinstance(port, str):
+        return {first: _at_line(documents[first].driver, port)}
     match documents[first].driver:
         case "modbus-tcp":
             from firable.executor.drivers.far_side.modbus_server import ModbusTcpEnd
@@ -191,6 +224,17 @@ def _ends(binding: Binding, port: int, names: Sequence[str]) -> dict[str, FarEnd
     return dict.fromkeys(names, end)
 
 
+def _at_line(driver: str, path: str) -> FarEnd:
+    """The end of a device on a serial line."""
+    if driver == "serial":
+        from firable.executor.drivers.far_side.serial_device import SerialEnd
+
+        return SerialEnd(path)
+    from firable.executor.drivers.far_side.modbus_server import ModbusRtuEnd
+
+    return ModbusRtuEnd(path)
+
+
 def _points(binding: Binding, name: str) -> dict[Point, Value]:
     """The points that a device must have, with the values that they have at first, and so their types."""
     document = binding.document
@@ -200,6 +244,8 @@ def _points(binding: Binding, name: str) -> dict[Point, Value]:
         points[device.heartbeat.write] = 0
         if device.heartbeat.tripped is not None:
             points[device.heartbeat.tripped] = False
+    if device.alive is not None:
+        points[device.alive.read] = 0
     for channel in device.channels.values():
         said: Value = 0 if channel.request is None else False
         points |= {point: said for point in (channel.taken, channel.done, channel.failed, channel.request) if point}
@@ -214,4 +260,5 @@ def _points(binding: Binding, name: str) -> dict[Point, Value]:
     for signal in document.signals.values():
         if signal is not None and signal.device == name:
             points[signal.read] = False
+            points |= {point: 0 for point in (signal.edges,) if point}
     return points

@@ -1,7 +1,8 @@
 """A serial line without wires: two pseudo-terminals, with bytes carried between them by the event loop.
 
-The ends are named by paths, as serial ports are, so that the code under test opens them as it would open a port. What
-goes in while the line is cut is lost.
+The ends are named by paths, as serial ports are, so that the code under test opens them as it would open a port. The
+system chooses the names; where a binding has chosen one, a symbolic link leads from there to the near end. What goes in
+while the line is cut is lost.
 """
 
 from __future__ import annotations
@@ -10,12 +11,16 @@ import asyncio
 import os
 import tty
 from contextlib import suppress
+from pathlib import Path
+
+from firable.executor.reasons import reason
 
 
 class PseudoLine:
-    """A line with the ports `near` and `far`, once it is open."""
+    """A line with the ports `near` and `far`, once it is open; a `link` leads to `near` then."""
 
-    def __init__(self) -> None:
+    def __init__(self, link: str = "") -> None:
+        self.link = link
         self.near = ""
         self.far = ""
         self.passes = True
@@ -24,7 +29,10 @@ class PseudoLine:
         """Held open, so that a port that is closed and opened again finds the line as it was."""
 
     def open(self) -> None:
-        """Make the line, if it is not there yet; must be called while the event loop runs that carries the bytes."""
+        """Make the line, if it is not there yet; must be called while the event loop runs that carries the bytes.
+
+        Raises `OSError` where the link cannot be made, as something stands there.
+        """
         if self.masters:
             return
         near_master, near_slave = os.openpty()
@@ -37,9 +45,21 @@ class PseudoLine:
         for source, target in ((near_master, far_master), (far_master, near_master)):
             os.set_blocking(source, False)
             loop.add_reader(source, self._carry, source, target)
+        if self.link:
+            link = Path(self.link)
+            try:
+                if link.is_symlink() and not link.exists():
+                    link.unlink()  # of a line that is gone with its process
+                link.symlink_to(self.near)
+            except OSError as error:
+                self.close()
+                raise OSError(f"{self.link} cannot be made to lead to a line: {reason(error)}") from error
 
     def close(self) -> None:
-        """Take the line away."""
+        """Take the line away, and the link that leads to it."""
+        link = Path(self.link)
+        if self.masters and link.is_symlink() and link.readlink() == Path(self.near):
+            link.unlink()
         for descriptor in self.masters:
             asyncio.get_running_loop().remove_reader(descriptor)
         for descriptor in (*self.masters, *self.slaves):

@@ -152,11 +152,11 @@ class ModbusUnit(ModbusServer):
 
 
 class ModbusRtuEnd(ModbusServer):
-    """A Modbus server at one end of a pseudo-line; the driver takes the other end."""
+    """A Modbus server at one end of a pseudo-line; the driver takes the other end, or a `link` to it."""
 
-    def __init__(self) -> None:
+    def __init__(self, link: str = "") -> None:
         super().__init__()
-        self.line = PseudoLine()
+        self.line = PseudoLine(link)
         self.server: ModbusSerialServer | None = None
 
     async def start(self, written: Callable[[Point, Value], None]) -> None:

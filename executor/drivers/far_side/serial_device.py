@@ -14,11 +14,11 @@ from firable.executor.drivers.serial_line import Lines
 
 
 class SerialEnd:
-    """A device; the driver takes the port `line.near`."""
+    """A device; the driver takes the port `line.near`, or a `link` to it."""
 
-    def __init__(self) -> None:
+    def __init__(self, link: str = "") -> None:
         self.faults = Faults()
-        self.line = PseudoLine()
+        self.line = PseudoLine(link)
         self.values: dict[Point, Value] = {}
         self.written: Callable[[Point, Value], None] = lambda _point, _value: None
         self.lines: Lines | None = None
