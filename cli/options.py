@@ -11,7 +11,7 @@ import click
 from click.core import ParameterSource
 
 from firable.cli.choice import OneOf
-from firable.cli.files import CATALOGUE, READ, WRITTEN, is_folder, nets_below, refuse_to_overwrite
+from firable.cli.files import CATALOGUE, NET_FILES, READ, WRITTEN, is_folder, nets_below, refuse_to_overwrite
 from firable.cli.finite import FiniteRange
 from firable.cli.report import Outcome, Report, document, exit_code_of, worst
 
@@ -179,6 +179,32 @@ def catalogue_file(argument: str, kind: str) -> Path:
         raise click.UsageError(_not_in_catalogue(name))
     path = catalogue_path(name)
     return path.with_name(f"{name}.plant.yaml") if kind == "plant" else path
+
+
+def plant_found(argument: str, net_name: str) -> str | None:
+    """The plant file of a net or bundle where no option names one: beside its file, or that of the catalogue's cell."""
+    from firable.nets.catalogue import catalogue_names
+
+    if not argument.startswith(CATALOGUE) and (beside := _plant_beside(argument)).is_file():
+        return str(beside)
+    name = net_name.replace("-", "_")
+    is_there = name in catalogue_names() and catalogue_file(f"{CATALOGUE}{name}", "plant").exists()
+    return f"{CATALOGUE}{name}" if is_there else None
+
+
+def plant_for(argument: str, net_name: str) -> str:
+    """The same for a command that needs a plant; it is a mistake of the command line where there is none."""
+    found = plant_found(argument, net_name)
+    if found is None:
+        beside = "" if argument.startswith(CATALOGUE) else f"there is no {_plant_beside(argument)}, and "
+        message = f"name the plant file of the cell with --plant: {beside}none in the catalogue is '{net_name}'"
+        raise click.UsageError(message)
+    return found
+
+
+def _plant_beside(argument: str) -> Path:
+    suffix = next(filter(argument.endswith, NET_FILES), Path(argument).suffix)
+    return Path(f"{argument.removesuffix(suffix)}.plant.yaml")
 
 
 _OTHER_FILES: Final = {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,11 +11,11 @@ import click
 from firable.cli import text
 from firable.cli.bound_run import run_bound_of, show_bound
 from firable.cli.choice import OneOf
-from firable.cli.files import CATALOGUE, READ, WRITTEN
+from firable.cli.files import READ, WRITTEN
 from firable.cli.hosting import HostOptions, host_options, run_host_of, show_host
 from firable.cli.log import log_option, log_to, told_aside
 from firable.cli.operate import ServeOptions, serve_options
-from firable.cli.options import answer, catalogue_file, format_option, is_given, refuse_a_net
+from firable.cli.options import answer, format_option, is_given, plant_for, refuse_a_net
 from firable.cli.report import Report
 from firable.cli.sign import trust_option
 from firable.cli.watched import machines_verdict, show_coalesced
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from firable.executor import Answer, Operator, RunReport
-    from firable.nets.bundle import Bundle
     from firable.nets.net import Net
     from firable.nets.verdict import Verdict
 
@@ -35,7 +33,11 @@ _SPEEDS = {"max": None, "1": 1.0, "10": 10.0}
 @click.command(short_help="Run a bundle on the simulated cell, or on real machines.")
 @click.argument("bundle", metavar="BUNDLE", type=READ)
 @click.option(
-    "--plant", metavar="FILE", type=READ, help="The plant file of the cell, or catalogue:NAME.  [default: by its name]"
+    "--plant",
+    metavar="FILE",
+    type=READ,
+    help="The plant file of the cell, or catalogue:NAME.  [default, for a simulated cell: NAME.plant.yaml beside "
+    "BUNDLE, else that of the net's name in the catalogue]",
 )
 @click.option(
     "--workpieces", type=click.IntRange(min=1), default=10, show_default=True, help="How many to carry through."
@@ -147,16 +149,15 @@ def run(
         raise click.UsageError(f"--watch {watch} holds the machines against a plant file: say with --plant which")
 
     def make() -> Report:
+        from firable.cli.loop import read_machines
         from firable.cli.stepping import stepping
-        from firable.executor import Watch, load, read_plant
+        from firable.executor import Watch, load
         from firable.executor import run as run_bundle
 
         _demand_a_file(trace)
         loaded = load(bundle, trust)
-        plant_file = None
-        if plant is not None or (options.bind is None and not options.is_one_of_several):
-            plant_file = _plant_file(loaded, plant)
-        model = None if plant_file is None else read_plant(plant_file)
+        cell = plant_for(bundle, loaded.net.name) if plant is None and is_simulated else plant
+        model = None if cell is None else read_machines(cell)
         service = served.service(bundle, model)
         pace = 1.0 if options.bind is not None else _SPEEDS[speed]
         stepped: AbstractContextManager[Operator | None] = nullcontext()
@@ -183,10 +184,11 @@ def run(
                     service=service,
                     log=told_to,
                 )
+            assert model is not None, "a simulated cell is made of its plant"
             with told_aside(_told, told_to) as tell:
                 report = run_bundle(
                     loaded,
-                    model or read_plant(_plant_file(loaded, plant)),
+                    model,
                     workpieces=workpieces,
                     seed=seed,
                     speed=_SPEEDS[speed],
@@ -249,20 +251,6 @@ def _said(net: Net, say: tuple[str, ...]) -> dict[str, Answer]:
             raise click.UsageError(f"--say {option}: something else is said of '{place}' too")
         said[place] = SAID[word]
     return said
-
-
-def _plant_file(bundle: Bundle, argument: str | None) -> Path:
-    """The plant file that the option names, or the one of the catalogue that bears the name of the cell."""
-    from firable.nets.catalogue import catalogue_names
-
-    if argument is None:
-        name = bundle.net.name.replace("-", "_")
-        argument = f"{CATALOGUE}{name}"
-        if name not in catalogue_names() or not catalogue_file(argument, "plant").exists():
-            raise click.UsageError(
-                f"say with --plant on which cell to run: none in the catalogue is '{bundle.net.name}'"
-            )
-    return catalogue_file(argument, "plant") if argument.startswith(CATALOGUE) else Path(argument)
 
 
 def _demand_a_file(trace: str | None) -> None:

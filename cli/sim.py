@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from firable.cli.files import CATALOGUE, MADE, READ
+from firable.cli.files import MADE, READ
 from firable.cli.finite import FiniteRange
-from firable.cli.options import catalogue_file, load_net, write_text
+from firable.cli.options import load_net, plant_for, write_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -33,7 +33,11 @@ _NO_BUTTON = "; over MQTT there is none: serve some machines by another protocol
 @click.command(short_help="Serve the simulated cell over real protocols.")
 @click.argument("net", metavar="NET", type=READ)
 @click.option(
-    "--plant", metavar="FILE", type=READ, help="The plant file of the cell, or catalogue:NAME.  [default: by its name]"
+    "--plant",
+    metavar="FILE",
+    type=READ,
+    help="The plant file of the cell, or catalogue:NAME.  [default: NAME.plant.yaml beside NET, else that of the net's "
+    "name in the catalogue]",
 )
 @click.option("--modbus", is_flag=True, help="Serve machines over Modbus TCP.")
 @click.option("--opcua", is_flag=True, help="Serve machines over OPC UA.")
@@ -83,14 +87,15 @@ def sim(
     """
     import asyncio
 
+    from firable.cli.loop import read_machines
     from firable.executor.cell.plant import Plant
     from firable.executor.drivers.fitting import misfits as binding_misfits
     from firable.executor.operating.uncut import ended_by_signals
     from firable.nets.diagnostics import InputError
-    from firable.nets.machines.plant_file import misfits, read_plant
+    from firable.nets.machines.plant_file import misfits
 
     loaded = load_net(net).net
-    model = read_plant(_plant_file(loaded, plant))
+    model = read_machines(plant or plant_for(net, loaded.name))
     if problems := misfits(model, loaded):
         raise InputError(problems)
     disturbances = _disturbances(model, stuck, drop, hang)
@@ -226,18 +231,6 @@ async def _serve(
 def _pressed(cell: CellServer, *, pressed: bool) -> None:
     cell.press(pressed=pressed)
     click.echo(f"{cell.now_seconds():8.1f} s  the emergency stop is {'pressed' if pressed else 'released'}")
-
-
-def _plant_file(net: Net, argument: str | None) -> Path:
-    """The plant file that the option names, or the one of the catalogue that bears the name of the cell."""
-    from firable.nets.catalogue import catalogue_names
-
-    if argument is None:
-        name = net.name.replace("-", "_")
-        argument = f"{CATALOGUE}{name}"
-        if name not in catalogue_names() or not catalogue_file(argument, "plant").exists():
-            raise click.UsageError(f"say with --plant which cell to serve: none in the catalogue is '{net.name}'")
-    return catalogue_file(argument, "plant") if argument.startswith(CATALOGUE) else Path(argument)
 
 
 def _disturbances(

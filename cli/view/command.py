@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from firable.cli.files import CATALOGUE, NET_FILES, READ
+from firable.cli.files import CATALOGUE, READ
 from firable.cli.loop import read_machines
-from firable.cli.options import catalogue_file, load_net, net_argument
+from firable.cli.options import load_net, net_argument, plant_found
 
 if TYPE_CHECKING:
     from firable.cli.view.editing import Editing
@@ -100,22 +99,12 @@ def view(
 
 
 def _plant(loaded: Loaded, net: str, plant: str | None) -> PlantModel | str:
-    """The plant of the top view: the one that is named, or of that name beside the net; else why there is none."""
-    from firable.nets.catalogue import catalogue_names
-
-    if plant is not None:
-        return read_machines(plant)
-    name = loaded.net.name.replace("-", "_")
-    if net.startswith(CATALOGUE):
-        name = net.removeprefix(CATALOGUE)
-    elif net.endswith(NET_FILES):
-        beside = Path(net.rpartition(".firable.")[0] + ".plant.yaml")
-        if beside.is_file():
-            return read_machines(str(beside))
+    """The plant of the top view: the one that is named, or is found for the net; else why there is none."""
     is_shipped = net.startswith(CATALOGUE) or loaded.decomposition is not None
-    if is_shipped and name in catalogue_names() and catalogue_file(f"{CATALOGUE}{name}", "plant").exists():
-        return read_machines(f"{CATALOGUE}{name}")
-    return "no plant file says what the cell is made of: name it with --plant"
+    found = plant or plant_found(net, loaded.net.name if is_shipped else "")
+    return (
+        "no plant file says what the cell is made of: name it with --plant" if found is None else read_machines(found)
+    )
 
 
 async def _served(editing: Editing, port: int, *, open_it: bool) -> None:

@@ -286,7 +286,7 @@ def test_commands_of_a_device_that_was_never_reached_are_counted_as_issued_and_n
         ),
         (["sim", "catalogue:one_robot", "--modbus", "--drop", "MC.CLAMP#2"], "nothing is held when 'MC.CLAMP' ends"),
         (["sim", "catalogue:one_robot", "--modbus", "--hang", "R.MOVE#0"], "'R.MOVE#0' never comes"),
-        (["sim", "catalogue:philosophers-3", "--modbus"], "say with --plant which cell to serve"),
+        (["sim", "catalogue:philosophers-3", "--modbus"], "name the plant file of the cell with --plant"),
         (
             ["sim", "catalogue:one_robot", "--mqtt", "--press", "1"],
             "--press: the binding has no contact of an emergency",
@@ -305,6 +305,20 @@ def test_mistakes_of_who_serves_a_cell_are_told(
     assert main(arguments) == 2
     assert list(tmp_path.iterdir()) == []
     assert message in capsys.readouterr().err
+
+
+def test_plant_file_beside_the_net_is_the_one_that_is_served(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    net = catalogue_path("one_robot").read_text("utf-8").replace("cell: one-robot", "cell: turning", 1)
+    Path("turning.firable.yaml").write_text(net, "utf-8")
+    command = ["sim", "turning.firable.yaml", "--modbus", "--for", "0"]
+    assert main(command) == 2
+    assert "there is no turning.plant.yaml, and none in the catalogue is 'turning'" in capsys.readouterr().err
+    plant = catalogue_path("one_robot").with_name("one_robot.plant.yaml")
+    Path("turning.plant.yaml").write_text(plant.read_text("utf-8"), "utf-8")
+    assert main(command) == 0
 
 
 def test_what_was_to_go_wrong_and_has_not_is_told_at_the_end(

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -69,6 +70,21 @@ def notes_of(trace: Path) -> list[str]:
     assert replay(catalogue_net("one_robot"), read).complete
     assert read.end is not None
     return [*(event.note for event in read.events if isinstance(event, Noted) and event.note != VOTED), read.end.reason]
+
+
+def test_plant_file_beside_the_bundle_is_the_one_that_is_run(
+    bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cell = tmp_path / "turning.bundle"
+    shutil.copy(bundle, cell)
+    beside = tmp_path / "turning.plant.yaml"
+    beside.write_text(PLANT.read_text("utf-8").replace("station: cv1_entry", "station: nowhere"), "utf-8")
+    assert main(["run", str(cell)]) == 2  # that of the catalogue has no mistake
+    assert "turning.plant.yaml" in capsys.readouterr().err
+    shutil.copy(PLANT, beside)
+    assert main(["run", str(cell), "--workpieces", "2"]) == 0
+    beside.unlink()
+    assert main(["run", str(cell), "--workpieces", "2"]) == 0  # the net is one of the catalogue
 
 
 @pytest.mark.parametrize("last", ["s\n", ""], ids=["s", "end of input"])
