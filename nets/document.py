@@ -25,7 +25,8 @@ _DIGITS: Final = re.compile(rf"0|-?[1-9][0-9]{{0,{DIGITS_MAX - 1}}}")
 
 
 def _as_list(value: object) -> object:
-    return [] if value is None else [value] if isinstance(value, str) else value
+    # Nothing is no list: `{from: , to: b}` is a name forgotten, and would be a transition that waits for nothing.
+    return [value] if isinstance(value, str) else value
 
 
 def as_integer(value: object) -> object:
@@ -50,7 +51,7 @@ def _as_pair(value: object) -> object:
 
 
 Name = Annotated[str, Field(min_length=1)]
-Names = Annotated[list[Name], BeforeValidator(_as_list, json_schema_input_type=Name | list[Name] | None)]
+Names = Annotated[list[Name], BeforeValidator(_as_list, json_schema_input_type=Name | list[Name])]
 Text = str
 Integer = Annotated[int, BeforeValidator(as_integer, json_schema_input_type=int)]
 FormulaText = Annotated[str, BeforeValidator(_as_formula, json_schema_input_type=str | bool)]

@@ -298,7 +298,8 @@ def _wanted(kind: str, context: Mapping[str, Any], node: Node, path: Path) -> st
         case "list_type" if text and not is_word:  # a name for a list of one name is not taken here
             return "a list is expected: `[name, name]`"
         case "list_type":
-            return "a name or a list of names is expected: `name` or `[name, name]`"
+            leave = f"; leave `{path[-1]}` out where there is none" if text == "" else ""
+            return f"a name or a list of names is expected: `name` or `[name, name]`{leave}"
         case "int_type" if text.isdigit():
             return f"a whole number of {doc.DIGITS_MAX} digits at most, without a 0 before it, is expected"
         case "int_type":
