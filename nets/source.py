@@ -89,11 +89,19 @@ def source_of(path: str | Path, data: bytes) -> Source:
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        found = f"byte {error.start} is 0x{data[error.start]:02x}"
-        raise _refusal(path, "F1004", f"not UTF-8 text: {found}", "save the file as UTF-8 text") from None
+        raise _no_text(
+            path, data, error.start, f"not UTF-8 text: byte {error.start} is 0x{data[error.start]:02x}"
+        ) from None
     if "\0" in text:
-        raise _refusal(path, "F1004", f"not text: byte {data.index(0)} is NUL", "save the file as UTF-8 text")
+        raise _no_text(path, data, (at := data.index(0)), f"not text: byte {at} is NUL")
     return Source(str(path), text)
+
+
+def _no_text(path: str | Path, data: bytes, at: int, message: str) -> InputError:
+    """The refusal of bytes that are no text, at the line and column of the first that is none."""
+    source = Source(printable(str(path)), data.decode("utf-8-sig", "replace"))
+    before = Source("", data[:at].decode("utf-8-sig")).lines
+    return source.refuse("F1004", message, "save the file as UTF-8 text", len(before), len(before[-1]) + 1)
 
 
 def read_bytes(path: str | Path, size_bytes_max: int) -> bytes:

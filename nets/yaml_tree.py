@@ -49,6 +49,9 @@ _WORDS_DOUBTFUL: Final = _WORDS_REFUSED | {"true", "false", "<<", ""}
 _FORBIDDEN: Final = re.compile("[^\t\n\r -~\xa0-\u2027\u202a-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]|\ufeff")
 """What YAML does not print, and the line ends on which its versions disagree (U+0085, U+2028, U+2029)."""
 
+_PLAIN_VALUE: Final = re.compile(r""":\s+[^\s"'{\[][^{}\[\],]*$""")
+"""A value without quotes, up to the end."""
+
 _TOO_DEEP: Final = "exceeded maximum nesting depth"
 """What libyaml says from 1,000 levels on, in versions that have such a bound."""
 
@@ -151,6 +154,8 @@ def _syntax_error(source: Source, error: yaml.MarkedYAMLError) -> InputError:
     text = source.lines[line - 1]
     if "\t" in text[: column + 1]:
         hint = "indent with spaces: YAML forbids tabs there"
+    elif text[column - 1 : column] == ":" and _PLAIN_VALUE.search(text[: column - 1]):
+        hint = "write a text with a colon and a blank in it in double quotes"
     elif ":" in text or not text.strip():
         hint = "check the indentation and the colons of this line and of the one before it"
     else:
