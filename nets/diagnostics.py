@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 from typing import Final
 
 Subject = tuple[str, ...]
@@ -230,8 +231,36 @@ def did_you_mean(name: str, known: Sequence[str]) -> str:
 
     # Comparing is slow where both are many or long: a hint is not worth a minute.
     known = [candidate for candidate in known if abs(len(candidate) - len(name)) <= 4][:2000] if len(name) <= 80 else []
-    close = get_close_matches(name, known, n=1, cutoff=0.6)
-    return f"did you mean '{close[0]}'? " if close else ""
+    close = filter(partial(_is_slip, name), get_close_matches(name, known, n=5, cutoff=0.6))
+    return next((f"did you mean '{one}'? " for one in close), "")
+
+
+def _is_slip(name: str, meant: str) -> bool:
+    """Whether each part of a name is as it is meant, but for a slip: what they share, such as an owner, says nothing.
+
+    >>> _is_slip("lathe.fere", "lathe.free"), _is_slip("lathe.reset", "lathe.free")
+    (True, False)
+    """
+    parts, others = name.split("."), meant.split(".")
+    if len(parts) != len(others):
+        return True
+    return all(
+        a.startswith(b) or b.startswith(a) or _edits(a, b) <= max(1, max(len(a), len(b)) // 3)
+        for a, b in zip(parts, others, strict=True)
+    )
+
+
+def _edits(a: str, b: str) -> int:
+    """How many letters to write, strike out, replace, or exchange with the next one lead from one word to another."""
+    before: list[int] = []
+    row: list[int] = [*range(len(b) + 1)]
+    for i, x in enumerate(a, 1):
+        before, above, row = row, before, [i]
+        for j, y in enumerate(b, 1):
+            row.append(min(before[j] + 1, row[j - 1] + 1, before[j - 1] + (x != y)))
+            if i > 1 and j > 1 and x == b[j - 2] and y == a[i - 2]:
+                row[j] = min(row[j], above[j - 2] + 1)
+    return row[-1]
 
 
 def with_meant(message: str, name: str, known: Sequence[str]) -> str:
@@ -244,16 +273,21 @@ def with_meant(message: str, name: str, known: Sequence[str]) -> str:
     return f"{message.removesuffix('.')}; {near}" if near else message
 
 
-def unknown_name(code: str, kind: str, name: str, known: Collection[str], subject: Subject) -> Diagnostic:
+def unknown_name(
+    code: str,
+    kind: str,
+    name: str,
+    known: Collection[str],
+    subject: Subject,
+    hint: str = "Declare it first, or correct the name.",
+) -> Diagnostic:
     """The diagnostic on a name that nothing has, with the known name that was probably meant."""
     owner, _, own = name.partition(".")
     if f"{owner}.{name}" in known:  # declared by its full name, where the local one is expected
-        hint = f"'{owner}.{name}' is declared: inside '{owner}' names are local, so write '{own}' there"
-        return Diagnostic(code, f"there is no {kind} '{name}'", hint, subject)
+        said = f"'{owner}.{name}' is declared: inside '{owner}' names are local, so write '{own}' there"
+        return Diagnostic(code, f"there is no {kind} '{name}'", said, subject)
     local = min((full for full in known if full.rpartition(".")[2] == name), default=None)
     # Names much longer or shorter are no slips of the pen, and would be sorted for nothing.
     similar = sorted(full for full in known if abs(len(full) - len(name)) <= 4)
     suggestion = f"did you mean '{local}'? " if local else did_you_mean(name, similar)
-    return Diagnostic(
-        code, f"there is no {kind} '{name}'", f"{suggestion}Declare it first, or correct the name.".strip(), subject
-    )
+    return Diagnostic(code, f"there is no {kind} '{name}'", f"{suggestion}{hint}", subject)

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -223,9 +224,9 @@ class _Reading:
             raise self.refuse(element, f"<{quoted(element.tag)[1:-1]}> where a <{kind}> is expected")
         name = self.renamed.get(element.text, element.text)
         unknown = self.known.place(name) if kind == "place" else self.known.transition(name)
-        for code, message, hint in unknown:
+        for problem in unknown:
             span = self.source.span(element.line, element.column, len(element.tag) + 2)
-            self.report(Diagnostic(code, message, hint, span=span))
+            self.report(replace(problem, span=span))
         return name
 
 

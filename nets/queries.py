@@ -14,13 +14,13 @@ docs/queries.md says what each means. The other form of the file is the property
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Set
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Final
 
-from firable.nets.diagnostics import Diagnostic, InputError, did_you_mean
+from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.formula import (
     Compare,
     Count,
@@ -30,12 +30,13 @@ from firable.nets.formula import (
     format_count,
     parse_formula,
 )
+from firable.nets.formula_tokens import tokens_of
 from firable.nets.net import Net
-from firable.nets.source import Source, quoted, read_bytes
+from firable.nets.source import Source, quoted, read_bytes, source_of
 from firable.nets.temporal import Logic, Temporal, format_temporal, logics, parse_temporal
 from firable.nets.temporal_parts import atoms_in
 from firable.nets.text_positions import bounded
-from firable.nets.well_formed import is_name
+from firable.nets.well_formed import is_name, unknown_in_formula
 
 SIZE_BYTES_MAX: Final = 64 * 1024 * 1024
 PROBLEMS_MAX: Final = 100  # enough to read; a file of noise has millions
@@ -136,12 +137,7 @@ def read_queries(path: str | Path, net: Net, renamed: Mapping[str, str] | None =
         from firable.nets.property_xml import parse_property_xml
 
         return parse_property_xml(data, net, renamed or {}, str(path))
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        source = Source(str(path), "")
-        raise source.refuse("F1004", f"not UTF-8 text: byte {error.start}", "save the file as UTF-8 text") from None
-    return parse_queries(text, net, str(path))
+    return parse_queries(source_of(path, data).text, net, str(path))
 
 
 def parse_queries(text: str, net: Net, file: str = "<queries>") -> tuple[Query, ...]:
@@ -164,8 +160,11 @@ class _Lines:
         self.problems: list[Diagnostic] = []
 
     def refuse(self, code: str, message: str, hint: str, line: int, column: int) -> None:
+        self.report(Diagnostic(code, message, hint, span=self.source.span(line, column)))
+
+    def report(self, problem: Diagnostic) -> None:
         if len(self.problems) < PROBLEMS_MAX:
-            self.problems.append(Diagnostic(code, message, hint, span=self.source.span(line, column)))
+            self.problems.append(problem)
 
     def queries(self) -> Iterator[Query]:
         names: dict[str, int] = {}
@@ -187,8 +186,8 @@ class _Lines:
                 hint = "docs/queries.md has the grammar"
                 self.refuse("F1012", f"not a query: {error.message}", hint, number, column + error.column)
                 continue
-            for code, message, hint in known.problems(query):
-                self.refuse(code, message, hint, number, column)
+            for problem in known.problems(query):
+                self.report(_in_query(problem, self.source, text.strip(), number, column))
             yield query
 
 
@@ -197,10 +196,11 @@ class KnownNames:
 
     def __init__(self, net: Net) -> None:
         self.net = net
+        self._places, self._transitions = frozenset(net.place_index), frozenset(net.transition_index)
         self._asked: set[tuple[str, str]] = set()
 
-    def problems(self, query: Query) -> Iterator[tuple[str, str, str]]:
-        """Code, message and hint for each name of the query that the net does not have, each name once a file."""
+    def problems(self, query: Query) -> Iterator[Diagnostic]:
+        """A problem with each name of the query that the net does not have, each name once a file."""
         atoms = [] if query.formula is None else list(atoms_in(query.formula))
         for name in (*query.places, *(atom.place for atom in atoms if isinstance(atom, Holds))):
             yield from self.place(name)
@@ -208,19 +208,19 @@ class KnownNames:
             if not isinstance(atom, Holds):
                 yield from self.transition(atom.transition)
 
-    def place(self, name: str) -> Iterator[tuple[str, str, str]]:
+    def place(self, name: str) -> Iterator[Diagnostic]:
         """The problem with the name of a place, if it is unknown and not yet reported."""
-        yield from self._unknown("F2002", "place", name, self.net.place_index)
+        yield from self._unknown("place", name, self._places)
 
-    def transition(self, name: str) -> Iterator[tuple[str, str, str]]:
+    def transition(self, name: str) -> Iterator[Diagnostic]:
         """The problem with the name of a transition, if it is unknown and not yet reported."""
-        yield from self._unknown("F2004", "transition", name, self.net.transition_index)
+        yield from self._unknown("transition", name, self._transitions)
 
-    def _unknown(self, code: str, kind: str, name: str, known: Mapping[str, int]) -> Iterator[tuple[str, str, str]]:
+    def _unknown(self, kind: str, name: str, known: Set[str]) -> Iterator[Diagnostic]:
         if name not in known and (kind, name) not in self._asked:
             self._asked.add((kind, name))
-            hint = did_you_mean(name, list(known)) + f"a query names the {kind}s of the net"
-            yield code, f"there is no {kind} {quoted(name)}", hint
+            problem = unknown_in_formula(kind, name, self.net, (name,), f"A query names the {kind}s of the net.")
+            yield replace(problem, message=problem.message.replace(f"'{name}'", quoted(name)))
 
 
 def query_named(text: str, net: Net, name: str = "query") -> Query:
@@ -236,5 +236,12 @@ def query_named(text: str, net: Net, name: str = "query") -> Query:
         column = len(text) - len(text.lstrip()) + error.column + 1
         raise source.refuse("F1012", f"not a query: {error.message}", hint, 1, column) from None
     if problems := list(KnownNames(net).problems(query)):
-        raise InputError(Diagnostic(code, message, hint, span=source.span(1, 1)) for code, message, hint in problems)
+        raise InputError(_in_query(problem, source, text, 1, 1) for problem in problems)
     return query
+
+
+def _in_query(problem: Diagnostic, source: Source, text: str, line: int, column: int) -> Diagnostic:
+    """A problem with a name, where that stands in the text of a query, which begins at a line and column."""
+    (name,) = problem.subject
+    at = next((token.column for token in tokens_of(text) if token.text == name), 0)
+    return replace(problem, span=source.span(line, column + at, len(name)))

@@ -8,7 +8,7 @@ express, such as a completion signal that gates nothing, is a `ValueError`: the 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from firable.nets.diagnostics import Diagnostic, Subject, did_you_mean, unknown_name
@@ -307,7 +307,13 @@ def _transition_problems(transition: Transition, known: _Known) -> Iterator[Diag
                     subject,
                 )
             elif not is_gate:
-                yield unknown_name("F2002", "place", name, places, subject)
+                own = name.rpartition(".")[2]
+                alike = [signal for signal in signals if signal.rpartition(".")[2] == own]
+                unknown = unknown_name("F2002", "place", name, places, subject)
+                if len(alike) == 1:
+                    hint = f"'{alike[0]}' is a signal, which can be a gate: write it under `if` or `unless`"
+                    unknown = replace(unknown, hint=hint)
+                yield unknown
             elif name not in signals:
                 yield unknown_name("F2021", "place or signal", name, places | signals, subject)
     seen_gates: set[ExternalGate] = set()
@@ -380,10 +386,29 @@ def _properties(net: Net) -> Iterator[Diagnostic]:
             if isinstance(atom, Holds):
                 if atom.place not in places:
                     subject: Subject = ("properties", prop.name, atom.place)
-                    yield unknown_name("F2002", "place", atom.place, places, subject)
+                    yield unknown_in_formula("place", atom.place, net, subject)
             elif atom.transition not in transitions:
                 subject = ("properties", prop.name, atom.transition)
-                yield unknown_name("F2004", "transition", atom.transition, transitions, subject)
+                yield unknown_in_formula("transition", atom.transition, net, subject)
+
+
+def unknown_in_formula(
+    kind: str, name: str, net: Net, subject: Subject, hint: str = "Declare it first, or correct the name."
+) -> Diagnostic:
+    """The diagnostic on a name in a formula that no place, or no transition, of the net has."""
+    if kind == "place":
+        transitions = {transition.name for transition in net.transitions}
+        if name in transitions:
+            said = f"write `firable({name})` where it may fire, or name a place"
+            return Diagnostic("F2002", f"'{name}' is a transition, and no place", said, subject)
+        return unknown_name("F2002", kind, name, {place.name for place in net.places}, subject, hint)
+    if any(place.name == name for place in net.places):
+        filling = next(
+            (f", such as '{one.name}', which puts a token on it" for one in net.transitions if name in one.outputs), ""
+        )
+        said = f"write `{name}` for a token on it, or name a transition{filling}"
+        return Diagnostic("F2004", f"'{name}' is a place, and no transition", said, subject)
+    return unknown_name("F2004", kind, name, {transition.name for transition in net.transitions}, subject, hint)
 
 
 def _atoms(prop: Property | TemporalProperty) -> Iterator[Holds | Firable | Fires]:

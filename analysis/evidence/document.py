@@ -253,8 +253,8 @@ def _document(record: EvidenceRecord) -> Document:
         if verdict.query:
             if not verdict.name.startswith("query."):
                 raise ValueError(f"'{verdict.name}' is no query, and comes with the text of one")
-            for _, message, _ in names_of_net.problems(parse_query(verdict.query)):
-                raise ValueError(message)
+            for problem in names_of_net.problems(parse_query(verdict.query)):
+                raise ValueError(problem.message)
         shown = []
         for one in verdict.shown:
             claim, of = one.claim.of(net), one.certificate

@@ -10,7 +10,7 @@ from firable.decompose.refinement.refining import refine
 from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.bound import bound_driver
 from firable.nets.catalogue import catalogue_net, catalogue_path, catalogue_tasks
-from firable.nets.diagnostics import InputError
+from firable.nets.diagnostics import InputError, did_you_mean
 from firable.nets.editing import edits
 from firable.nets.machines.plant_file import misfits, parse_plant
 from firable.nets.net import Controller, Net
@@ -105,6 +105,11 @@ def test_the_name_that_was_probably_meant_is_told(wrong: Callable[[], object], m
         wrong()
     hints = [re.match(r"did you mean '(.*?)'\?", problem.hint) for problem in refused.value.diagnostics]
     assert meant in [hint.group(1) for hint in hints if hint is not None], refused.value
+
+
+def test_a_name_that_is_like_another_by_its_owner_alone_is_no_slip_of_it() -> None:
+    assert did_you_mean("lathe.reset", ["lathe.free", "lathe.busy"]) == ""
+    assert did_you_mean("lathe.fere", ["lathe.free", "lathe.busy"]) == "did you mean 'lathe.free'? "
 
 
 @pytest.mark.parametrize(

@@ -76,8 +76,8 @@ def test_the_problems_of_a_file_are_reported_together_with_their_positions() -> 
         ("F1012", 1, 12),
         ("F1018", 2, 1),
         ("F2001", 3, 1),
-        ("F2002", 3, 4),
-        ("F2004", 4, 4),
+        ("F2002", 3, 7),
+        ("F2004", 4, 12),
         ("F1018", 5, 1),
         ("F1018", 6, 1),
     ]
@@ -89,9 +89,33 @@ def test_a_file_without_queries_is_refused() -> None:
 
 def test_a_single_query_is_checked_like_a_file() -> None:
     assert query_named("AG EF p", NET).kind is QueryKind.CTL
-    for text, code in (("AG EF", "F1012"), ("EF r", "F2002"), ("EF firable(r)", "F2004")):
-        with pytest.raises(InputError, match=code):
+    for text, code, column in (
+        ("AG EF", "F1012", 6),
+        ("EF r", "F2002", 4),
+        (" EF (p and r)", "F2002", 12),
+        ("bound tokens(p, r)", "F2002", 17),
+        ("EF firable(r)", "F2004", 12),
+    ):
+        with pytest.raises(InputError, match=code) as caught:
             query_named(text, NET)
+        span = caught.value.diagnostics[0].span
+        assert span is not None
+        assert (span.line, span.column) == (1, column)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("F fires(p)", "'p' is a place, and no transition"),
+        ("F fires(q)", "name a transition, such as 't', which puts a token on it"),
+        ("EF t", "'t' is a transition, and no place"),
+        ("EF \x1bc", "there is no place '·c'"),
+    ],
+)
+def test_a_name_of_the_other_kind_is_told_as_what_it_is(text: str, told: str) -> None:
+    with pytest.raises(InputError) as caught:
+        query_named(text, NET)
+    assert told in str(caught.value)
 
 
 def test_files_are_told_apart_by_their_first_character(tmp_path: Path) -> None:

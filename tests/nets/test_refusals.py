@@ -58,6 +58,8 @@ TABLE = (
     net("bracket left open", "transitions: {t: {from: [p, q}}\n", "F1005 3:30", "check the"),
     net("missing colon", "places:\n  p\n  q:\n", "F1005 5:4", "check the indentation and the colons"),
     net("key without a colon", "places: {p: }\nstart\n", "F1005 4:1", "check the"),
+    net("colon in a text", "description: mind: hot\n", "F1005 3:18", "in double quotes"),
+    net("colon in a text in braces", T + "  t: {description: mind: hot, from: p}\n", "F1005 4:24", "in double quotes"),
     net("nesting without end", "places: " + "[" * 10_000, "F1005 3:40", "a net needs no such nesting"),
     net("control character", "description: a\x07b\n", "F1005 3:15", "delete it"),
     net("byte order mark inside", "description: a\ufeffb\n", "F1005 3:15", "delete it"),
@@ -102,6 +104,10 @@ TABLE = (
         "a name or text is expected"),
     net("places as a list", "places: [p, q]\n", "F1010 3:9", "a mapping, lines of `name: value`"),
     net("from as a mapping", T + "  t: {from: {p: q}}\n", "F1010 4:13", "a name or a list of names"),
+    net("from with a comma and no name", T + "  t: {from: , to: q}\n", "F1010 4:7",
+        "leave `from` out where there is none"),
+    net("to with nothing", T + "  t:\n    from: q\n    to:\n", "F1010 6:5", "leave `to` out where there is none"),
+    net("list with an empty item", T + "  t:\n    from:\n      - p\n      -\n", "F1010 7:8", "a name or text"),
     net("number that is none", T + "  t: {number: one}\n", "F1010 4:15", "a whole number from 0"),
     net("negative number", T + "  t: {number: -1}\n", "F1010 4:15", "a whole number from 0"),
     net("number that is too long", T + "  t: {number: 9999999999999999999}\n", "F1010 4:15",
@@ -133,6 +139,10 @@ TABLE = (
         "write places joined"),
     net("unknown place in a formula", "places: {a: }\nproperties: {p: {never: a and (not b)}}\n", "F2002 4:36",
         "Declare it"),
+    net("firing of a place", "places: {a: }\ntransitions: {t: {to: a}}\nproperties: {p: {ltl: G fires(a)}}\n",
+        "F2004 5:31", "write `a` for a token on it, or name a transition, such as 't', which puts"),
+    net("token on a transition", "transitions: {t: }\nproperties: {p: {never: t}}\n", "F2002 4:25",
+        "write `firable(t)` where it may fire"),
     net("unknown transition in a formula", "properties: {p: {never: firable(go)}}\n", "F2004 3:33", "Declare it"),
     net("place with the name of an atom", "places: {start: }\nproperties: {p: {never: start}}\n", "F2012 3:10",
         "rename the place"),
@@ -150,6 +160,9 @@ TABLE = (
     net("missing owner", ROBOT + T + "  t: {from: free}\n", "F2002 11:13", "did you mean 'robot.free'?"),
     net("one wrong name in three places", ROBOT + T + "  t: {from: busy}\n  u: {from: busy}\n  v: {to: busy}\n",
         "F2002 11:13", "did you mean 'robot.busy'?"),
+    net("place that is like no other", ROBOT + T + "  t: {from: robot.reset}\n", "F2002 11:13", "Declare it first"),
+    net("place that is declared as a signal elsewhere", "inputs: reset\n" + ROBOT + T + "  t: {from: robot.reset}\n",
+        "F2002 12:13", "'reset' is a signal, which can be a gate: write it under `if` or `unless`"),
     net("unknown gate", ROBOT + T + "  t: {from: robot.free, if: robot.door_shot}\n", "F2021 11:29",
         "did you mean 'robot.door_shut'?"),
     net("gate sourced in a transition", ROBOT + T + "  t: {from: robot.free}\n  u: {unless: t}\n", "F2008 12:15",
@@ -235,6 +248,16 @@ def test_a_binary_file_is_refused(tmp_path: Path) -> None:
     assert refused_file(path)[0] == "F1004"
     path.write_bytes(b"firable: 1\0")
     assert refused_file(path)[0] == "F1004"
+
+
+def test_the_first_byte_that_is_no_text_is_told_with_its_line_and_column(tmp_path: Path) -> None:
+    path = tmp_path / "cell.firable.yaml"
+    path.write_bytes("firable: 1\r\ncell: é".encode() + b"\xdf\n")
+    with pytest.raises(InputError) as refused:
+        read_net(path)
+    span = refused.value.diagnostics[0].span
+    assert span is not None
+    assert (span.line, span.column, span.excerpt) == (2, 8, "cell: é\N{REPLACEMENT CHARACTER}")
 
 
 def test_noise_of_100_megabytes_is_refused_unread(tmp_path: Path) -> None:
