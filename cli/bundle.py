@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -64,6 +65,8 @@ def bundle(
     refuses a bundle of which any byte was changed. Each bundle holds the proof on the protocol for nets of any size;
     with --protocol and --faults it also holds one on the protocol of NET itself, step by step.
     With --machines it holds the plant, and the proof that its machines keep what votes rely on (O4).
+    Each document of evidence, on NET and on each of its loops with machines, is looked for in --max-seconds, or 30; the
+    loops are explored to the end.
     With --conceptual it holds the tasks, too, and the proof that opening them makes NET, and keeps what can be done.
     """
     if output == "-":
@@ -120,7 +123,7 @@ def _report(
         try:
             made = make_bundle(found, Limits(Deadline.after(seconds), allowed.memory_bytes), **more)
         except UnbundledError as refusal:
-            verdicts = tuple(told.get(one.name) or _without_run(one) for one in refusal.verdicts)
+            verdicts = tuple(told.get(one.name) or _told(one, argument, machines) for one in refusal.verdicts)
             if overall(verdicts) is Status.PROVED:  # what is lacking is evidence
                 raise
             return replace(unmade, verdicts=verdicts)
@@ -135,14 +138,16 @@ def _report(
     )
 
 
-def _without_run(verdict: Verdict) -> Verdict:
+def _told(verdict: Verdict, argument: str, machines: str | None) -> Verdict:
     """A verdict on one of the loops with machines, told without its run: it is of a net that is not shown here."""
-    from firable.decompose.bundling import shown_by
+    from firable.decompose.bundling import seen_by
     from firable.decompose.proofs.closed_loops import PREFIXES
 
-    if verdict.witness is None or not verdict.name.startswith(PREFIXES):
+    is_seen = verdict.witness is not None or verdict.status.value == "unknown"
+    if machines is None or not is_seen or not verdict.name.startswith(PREFIXES):
         return verdict
-    return replace(verdict, witness=None, hint="; ".join(filter(None, (verdict.hint, shown_by(verdict.name)))))
+    hint = "; ".join(filter(None, (verdict.hint, seen_by(verdict, shlex.quote(argument), shlex.quote(machines)))))
+    return replace(verdict, witness=None, hint=hint)
 
 
 def _show(report: Report) -> None:

@@ -19,7 +19,7 @@ from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.goal import Limits
 from firable.analysis.report import CheckReport
-from firable.decompose.proofs.closed_loops import PREFIXES, UNDECIDED, sealed_loops
+from firable.decompose.proofs.closed_loops import UNDECIDED, sealed_loops
 from firable.decompose.proofs.proving import TIMEOUT_MS, ProofReport, prove
 from firable.decompose.protocol.outages import sealed_outages
 from firable.decompose.protocol.shown import proved_without_exploring
@@ -44,6 +44,7 @@ SECONDS: Final = 30.0
 METHOD: Final = "shown by its evidence"
 """How each verdict on the net was found, as a bundle says it: what it tells besides is for `firable check` to say."""
 LATE: Final = "the time for evidence was over"
+_MORE: Final = f"allow more time to look for evidence than the {SECONDS:g} s without it, with --max-seconds"
 
 
 class UnbundledError(InputError):
@@ -111,7 +112,8 @@ def make_bundle(
     if problems := (*unproved(bundle), *_given_up(proof)):
         lacking = {record.name: record.lacking for record in document.records if record.proved and record.lacking}
         lacking |= {verdict.name: LATE for verdict in held if verdict.holds and not verdict.evidence}
-        raise UnbundledError((_unbundled(problem, lacking) for problem in problems), verdicts)
+        loops = {verdict.name: verdict for verdict in held}
+        raise UnbundledError((_unbundled(problem, lacking, loops) for problem in problems), verdicts)
     return bundle
 
 
@@ -158,17 +160,21 @@ def _given_up(proof: ProofReport) -> Iterator[Diagnostic]:
             yield Diagnostic("F5002", message, verdict.hint, ("verdicts", verdict.name))
 
 
-def shown_by(name: str) -> str:
-    """Where one sees the run that refutes a verdict on a closed loop."""
-    return f"`firable {'prove' if name.startswith('o4.') else 'check'} NET --machines PLANT` shows the run"
+def seen_by(verdict: Verdict, net: str = "NET", plant: str = "PLANT") -> str:
+    """How one comes to see of a verdict on a closed loop what it is: by more time, or where the run is shown."""
+    if verdict.status is Status.UNKNOWN:
+        return _MORE
+    command = "prove" if verdict.name.startswith("o4.") else "check"
+    return f"`firable {command} {net} --machines {plant}` shows the run"
 
 
-def _unbundled(problem: Diagnostic, lacking: Mapping[str, str]) -> Diagnostic:
+def _unbundled(problem: Diagnostic, lacking: Mapping[str, str], loops: Mapping[str, Verdict]) -> Diagnostic:
     """What keeps a bundle from running, said to who makes it."""
     name = problem.subject[-1]
-    if name.startswith(PREFIXES) and name not in lacking:
-        return replace(problem, code="F4003", hint=f"{problem.hint}; {shown_by(name)}")
-    if name not in lacking:
-        return replace(problem, code="F4003")
-    message = f"'{name}' is proved, and there is no evidence that shows it again: {lacking[name]}"
-    return replace(problem, code="F4003", message=message, hint="allow more time to look for it, with --max-seconds")
+    if name in lacking:
+        message = f"'{name}' is proved, and there is no evidence that shows it again: {lacking[name]}"
+        return replace(problem, code="F4003", message=message, hint=_MORE)
+    if name in loops:
+        hint = "; ".join(filter(None, (problem.hint, seen_by(loops[name]))))
+        return replace(problem, code="F4003", hint=hint)
+    return replace(problem, code="F4003")

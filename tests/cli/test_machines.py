@@ -9,8 +9,12 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from firable.analysis.deadline import Deadline
+from firable.analysis.goal import Limits
 from firable.analysis.spaces.reachability import Budget
 from firable.cli.main import main
+from firable.decompose import bundling
+from firable.decompose.proofs import closed_loops
 from firable.decompose.proofs.held_gates import HeldGates, held_gates
 from firable.nets.catalogue import catalogue_path
 from firable.nets.decomposition import Decomposition
@@ -162,12 +166,26 @@ def test_a_bundle_that_the_machines_forbid_ends_with_a_report_of_what_is_violate
     assert main(["bundle", CELL, "-o", str(bundle), "--machines", str(plant)]) == 1
     told = capsys.readouterr()
     assert "✗ violated  o4.G4/mc.part_present" in told.out
-    assert "`firable prove NET --machines PLANT` shows the run" in told.out
-    assert "`firable check NET --machines PLANT` shows the run" in told.out
+    assert f"`firable prove {CELL} --machines {plant}` shows the run" in told.out
+    assert f"`firable check {CELL} --machines {plant}` shows the run" in told.out
     assert "violated: 2 violated" in told.out
     assert "no bundle was made" in told.out
     assert told.err == ""
     assert not bundle.exists()
+
+
+def test_a_bundle_for_whose_loops_the_time_is_too_short_says_how_to_give_more(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = closed_loops.sealed_loops
+
+    def late(decomposition: Decomposition, plant: str, _: object) -> object:
+        return real(decomposition, plant, lambda: Limits(Deadline.after(0)))
+
+    monkeypatch.setattr(bundling, "sealed_loops", late)
+    assert main(["bundle", CELL, "-o", str(tmp_path / "cell.bundle"), "--machines", PLANT]) != 0
+    told = capsys.readouterr()
+    assert "than the 30 s without it, with --max-seconds" in told.out + told.err
 
 
 def test_the_time_of_an_obligation_is_that_of_the_loop_too(monkeypatch: pytest.MonkeyPatch) -> None:
