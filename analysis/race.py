@@ -61,22 +61,27 @@ def race(
     """
     course = _Course[T](Event(), Lock())
     share = replace(limits, memory_bytes=max(1, limits.memory_bytes // max(1, len(lanes))))
-    threads = [Thread(target=course.go, args=(lane, share, slices_seconds), daemon=True) for lane in lanes if lane]
+    ends = [Event() for lane in lanes if lane]
+    threads = [
+        Thread(target=course.go, args=(lane, share, slices_seconds, end), daemon=True)
+        for lane, end in zip(filter(None, lanes), ends, strict=True)
+    ]
     interrupted = False
     try:
         for thread in threads:
             thread.start()
-        while any(thread.is_alive() for thread in threads):
-            if limits.deadline.over:
-                course.over.set()
-            for thread in threads:
-                thread.join(_TURN_SECONDS)  # in turns, so that Ctrl-C is heard
+        # Not by `join`: Ctrl-C in the midst of it has a thread that runs on taken for one that has ended (bpo-45274).
+        for end in ends:
+            while not end.wait(_TURN_SECONDS):
+                if limits.deadline.over:
+                    course.over.set()
     except KeyboardInterrupt:
         interrupted = True
     finally:
         course.over.set()
-        for thread in threads:
-            thread.join()
+        for thread, end in zip(threads, ends, strict=True):
+            if thread.ident is not None:
+                end.wait()
     if course.failure is not None:
         raise course.failure
     return Outcome(course.answer, course.winner, tuple(course.told), interrupted)
@@ -93,8 +98,17 @@ class _Course(Generic[T]):
         self.failure: BaseException | None = None
         self.told: list[str] = []
 
-    def go(self, lane: Sequence[Contestant[T]], limits: Limits, slices_seconds: Sequence[float] | None) -> None:
-        """One lane: its techniques in turn, in slices that grow; one that gives up early is not asked again."""
+    def go(
+        self, lane: Sequence[Contestant[T]], limits: Limits, slices_seconds: Sequence[float] | None, end: Event
+    ) -> None:
+        """One lane, which sets `end` at its end."""
+        try:
+            self._go(lane, limits, slices_seconds)
+        finally:
+            end.set()
+
+    def _go(self, lane: Sequence[Contestant[T]], limits: Limits, slices_seconds: Sequence[float] | None) -> None:
+        """Its techniques in turn, in slices that grow; one that gives up early is not asked again."""
         waiting = list(lane)
         for seconds in slices_seconds or (None,):
             for contestant in list(waiting):
