@@ -43,7 +43,7 @@ from firable.analysis.methods import (
     Technique,
 )
 from firable.analysis.question import Question, unknown
-from firable.analysis.race import Contestant, race
+from firable.analysis.race import SLICES_SECONDS, Contestant, race
 from firable.analysis.report import CheckReport, report_on
 from firable.analysis.settling import Lanes, Settling
 from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
@@ -59,6 +59,10 @@ from firable.semantics.trace import Discipline
 
 FIRST_MARKINGS: Final = 200_000
 """How many markings `auto` explores before it lets techniques race."""
+ALONE_SECONDS: Final = 60.0
+"""How long a technique that is named has for each question, where no time is given."""
+ALONE_STEPS: Final = 50
+"""How long runs it unrolls then: a solver takes longer for each further step, and comes to no end by itself."""
 _ALONE_SECONDS: Final = 0.1
 """How long techniques that hold all markings are alone, before others begin beside them."""
 _SPACES_SHARE: Final = 0.6  # of the time, for techniques that hold all markings
@@ -80,10 +84,12 @@ def check(
     method: Method | str = Method.AUTO,
     queries: Sequence[Query] = (),
     progress: Callable[[int, int], object] | None = None,
+    tell: Callable[[str], object] | None = None,
 ) -> CheckReport:
     """Decide every verdict on a net under a discipline, external gates free, by the method named.
 
-    The verdicts on `queries` follow those on the net's own properties.
+    The verdicts on `queries` follow those on the net's own properties. `progress` is told how many markings and edges
+    are found, and `tell` in words how far it is with verdicts that are settled one by one.
 
     Raises `InputError` F2001 where two queries have one name, F2013 where the arbiters do not fit the conflicts of the
     net, F3004 where the budget does not hold the net itself, F3006 where the method knows no synchronous steps.
@@ -101,7 +107,7 @@ def check(
     deadline = Deadline(cancelled=interrupted)
     if budget.seconds is not None:
         deadline = Deadline.after(budget.seconds, interrupted)
-    one = _Check(net, discipline, budget, deadline, interrupted, tuple(queries), progress)
+    one = _Check(net, discipline, budget, deadline, interrupted, tuple(queries), progress, tell)
     if method is Method.EXPLICIT or (method is Method.AUTO and discipline is Discipline.STEP):
         return one.explicitly()
     if discipline is Discipline.STEP:
@@ -121,6 +127,7 @@ class _Check:
     interrupted: Event
     queries: tuple[Query, ...]
     progress: Callable[[int, int], object] | None
+    tell: Callable[[str], object] | None
 
     def explicitly(self) -> CheckReport:
         """The report of the explicit engine alone, within the whole budget."""
@@ -200,10 +207,23 @@ class _Check:
         formulas = {of: words for techniques in FORMULAS.values() for of, words in techniques.items()}
         lanes = ((method,),) if method in GOALS | formulas else ()
         words = (KNOWERS | GOALS | formulas)[method].words
-        return self._settled(report, self._settling(), knowers, lanes, [f"{words}, and nothing else"])
+        settling, slices = self._settling(), None
+        if self.budget.seconds is None:
+            settling.depth_max, slices = ALONE_STEPS, (ALONE_SECONDS,)
+        report = self._settled(report, settling, knowers, lanes, [f"{words}, and nothing else"], slices)
+        return replace(report, verdicts=tuple(self._by_one(verdict, settling, words) for verdict in report.verdicts))
+
+    def _by_one(self, verdict: Verdict, settling: Settling, words: str) -> Verdict:
+        """A verdict, which says, where the one technique has not decided it, how far that has come."""
+        if verdict.status is not Status.UNKNOWN:
+            return verdict
+        if (said := settling.reached.get(verdict.name)) is not None:
+            return replace(verdict, bound=said, hint="allow it more time, with --max-seconds, or leave out --method")
+        why = "was not asked any more" if self.deadline.over else "does not decide it"
+        return replace(verdict, bound=f"{words} {why}", hint="leave out --method, or name another one")
 
     def _settling(self) -> Settling:
-        return Settling(self.net, self.queries, self.budget.memory_bytes, self.interrupted)
+        return Settling(self.net, self.queries, self.budget.memory_bytes, self.interrupted, self.tell)
 
     def _nothing(self) -> ReachabilityGraph:
         """A space of M0 alone, of which nothing is concluded but what holds of M0."""
@@ -283,7 +303,13 @@ class _Check:
         return graph
 
     def _settled(
-        self, report: CheckReport, settling: Settling, knowers: Mapping[Method, float], lanes: Lanes, course: list[str]
+        self,
+        report: CheckReport,
+        settling: Settling,
+        knowers: Mapping[Method, float],
+        lanes: Lanes,
+        course: list[str],
+        slices_seconds: Sequence[float] | None = SLICES_SECONDS,
     ) -> CheckReport:
         """The report with those of its unknown verdicts settled that can be.
 
@@ -302,13 +328,14 @@ class _Check:
         fired = self._fired(report.space) if open_() else set()
         waiting = open_()
         for left, verdict in zip(range(len(waiting), 0, -1), waiting, strict=True):
-            settling.ask(verdict, fired, lanes, _share(self.deadline, 1 / left))
+            settling.ask(verdict, fired, lanes, _share(self.deadline, 1 / left), slices_seconds)
             settling.conclude(report.verdicts)
         verdicts = tuple(
             settling.found.get(verdict.name, verdict) if verdict.status is Status.UNKNOWN else verdict
             for verdict in report.verdicts
         )
-        course = [*course, *settling.course] if verdicts != report.verdicts else course
+        is_told = verdicts != report.verdicts or self.interrupted.is_set()
+        course = [*course, *settling.course] if is_told else course
         return _told(replace(report, verdicts=verdicts, findings=settling.findings), course)
 
     def _fired(self, space: StateSpace[Any]) -> set[str]:

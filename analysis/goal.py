@@ -12,8 +12,9 @@ found it (where the technique has one). Not decided is an answer too, with how f
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from firable.analysis.deadline import Deadline
 from firable.nets.verdict import Cost, Witness
@@ -22,12 +23,25 @@ if TYPE_CHECKING:
     from firable.analysis.evidence.certificate import Certificate
 
 
+DEPTH_MAX: Final = 1_000
+"""How many steps a search that unrolls runs looks ahead at most."""
+
+
+def _nobody(_words: str) -> None:
+    """Hear what nobody wants to be told."""
+
+
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What a technique may take: until when (or until it is cancelled), and how many bytes."""
+    """What a technique may take: until when (or until it is cancelled), how many bytes, and how long runs it unrolls.
+
+    `tell` is told in words how far it is.
+    """
 
     deadline: Deadline = field(default_factory=Deadline)
     memory_bytes: int = 2 * 2**30
+    depth_max: int = DEPTH_MAX
+    tell: Callable[[str], object] = field(default=_nobody, compare=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ for all markings. What is told of it goes into the course of the report.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from threading import Event
@@ -22,7 +22,7 @@ from typing import Final
 
 from firable.analysis._engine import IncompleteGraph
 from firable.analysis.deadline import Deadline
-from firable.analysis.goal import Finding, Limits
+from firable.analysis.goal import DEPTH_MAX, Finding, Limits
 from firable.analysis.methods import FORMULAS, GOALS, KNOWERS, WORTH_ASKING, Method
 from firable.analysis.question import Answer, Known, Question, no, yes
 from firable.analysis.race import SLICES_SECONDS, Contestant, Outcome, T, race
@@ -59,17 +59,21 @@ _QUESTIONS: Final = {question.name: question for question in (*QUESTIONS, STARVA
 class Settling:
     """The verdicts on one net that were `found` without all markings, and the `course` of finding them.
 
-    `findings` keeps, by verdict, its goals with what was found of them: what evidence is made from. Ctrl-C sets
-    `interrupted`, after which nothing is begun.
+    `findings` keeps, by verdict, its goals with what was found of them: what evidence is made from; `reached` keeps how
+    techniques ended that did not decide one. Ctrl-C sets `interrupted`, after which nothing is begun. `tell` is told in
+    words what is being settled, and how far that is; `depth_max` is for techniques that unroll runs.
     """
 
     net: Net
     queries: tuple[Query, ...]
     memory_bytes: int
     interrupted: Event
+    tell: Callable[[str], object] | None = None
+    depth_max: int = DEPTH_MAX
     found: dict[str, Verdict] = field(default_factory=dict)
     course: list[str] = field(default_factory=list)
     findings: dict[str, list[tuple[Formula, Finding]]] = field(default_factory=dict)
+    reached: dict[str, str] = field(default_factory=dict)
 
     def shown(self) -> dict[str, Verdict]:
         """What was found but formulas of CTL that nothing shows: sets of markings give a run for most of these."""
@@ -110,7 +114,7 @@ class Settling:
         fired: Collection[str],
         lanes: Lanes,
         deadline: Deadline,
-        slices_seconds: Sequence[float] = SLICES_SECONDS,
+        slices_seconds: Sequence[float] | None = SLICES_SECONDS,
     ) -> None:
         """Settle a verdict by a race for each of its goals; not where one stays undecided or there are too many.
 
@@ -136,7 +140,9 @@ class Settling:
         if finding is not None:
             self._settle(question, yes(finding.witness), finding.method, finding.cost)
 
-    def _by_formula(self, verdict: Verdict, lanes: Lanes, deadline: Deadline, slices_seconds: Sequence[float]) -> None:
+    def _by_formula(
+        self, verdict: Verdict, lanes: Lanes, deadline: Deadline, slices_seconds: Sequence[float] | None
+    ) -> None:
         """Settle the verdict on a formula of CTL or LTL."""
         if (found := self._formula_of(verdict.name)) is None:
             self._by_halving(verdict, lanes, deadline, slices_seconds)
@@ -151,14 +157,15 @@ class Settling:
         ]
         if verdict.name in self.found or deadline.over or not any(contestants):
             return
-        outcome = self._told(
-            verdict.name, self.noted(race(contestants, Limits(deadline, self.memory_bytes), slices_seconds))
-        )
+        limits = self._limits(verdict.name, deadline)
+        outcome = self._told(verdict.name, self.noted(race(contestants, limits, slices_seconds)))
         if (known := outcome.answer) is not None:
             question = Question(verdict.name, verdict.statement, verdict.weight)
             self._settle(question, known.answer, known.method, known.cost)
 
-    def _by_halving(self, verdict: Verdict, lanes: Lanes, deadline: Deadline, slices_seconds: Sequence[float]) -> None:
+    def _by_halving(
+        self, verdict: Verdict, lanes: Lanes, deadline: Deadline, slices_seconds: Sequence[float] | None
+    ) -> None:
         """Settle the verdict on an upper bound of tokens."""
         bounds = (query for query in self.queries if query.kind is QueryKind.BOUND)
         query = next((query for query in bounds if f"query.{query.name}" == verdict.name), None)
@@ -187,7 +194,7 @@ class Settling:
         formula: Temporal,
         lanes: Lanes,
         deadline: Deadline,
-        slices_seconds: Sequence[float],
+        slices_seconds: Sequence[float] | None,
     ) -> None:
         """Settle the verdict on a formula that is put together from goals."""
         asked: list[Finding] = []
@@ -235,7 +242,7 @@ class Settling:
         self.found[question.name] = question.settle(answer, method, Discipline.INTERLEAVING, cost)
 
     def _race(
-        self, name: str, goal: Goal, lanes: Lanes, deadline: Deadline, slices_seconds: Sequence[float]
+        self, name: str, goal: Goal, lanes: Lanes, deadline: Deadline, slices_seconds: Sequence[float] | None
     ) -> Finding | None:
         """What the first technique finds that decides a goal; None where none does in time."""
         if deadline.over:
@@ -246,14 +253,23 @@ class Settling:
         ]
         if not any(contestants):
             return None
-        return self._told(
-            name, self.noted(race(contestants, Limits(deadline, self.memory_bytes), slices_seconds))
-        ).answer
+        limits = self._limits(name, deadline)
+        return self._told(name, self.noted(race(contestants, limits, slices_seconds))).answer
+
+    def _limits(self, name: str, deadline: Deadline) -> Limits:
+        """The limits of who is asked about a verdict, whose words are told as being about that."""
+        limits, tell = Limits(deadline, self.memory_bytes, self.depth_max), self.tell
+        if tell is None:
+            return limits
+        tell(name)
+        return replace(limits, tell=lambda words: tell(f"{name}: {words}"))
 
     def _told(self, name: str, outcome: Outcome[T]) -> Outcome[T]:
         """The outcome of a race about a verdict, which the course tells."""
         said = "; ".join(outcome.told) if outcome.answer is None else f"{outcome.winner} was first"
         self.course.append(f"{name}: {said}")
+        if outcome.answer is None:
+            self.reached[name] = said
         return outcome
 
     def noted(self, outcome: Outcome[T]) -> Outcome[T]:

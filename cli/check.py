@@ -82,7 +82,8 @@ class _Asked:
     type=OneOf([str(method) for method in Method]),
     default=str(Method.AUTO),
     show_default=True,
-    help="Let one technique answer; `auto` lets them race where exploring a moment does not suffice.",
+    help="Let one technique answer; `auto` lets them race where exploring a moment does not suffice. One alone has a "
+    "minute for each question, and `bounded` looks 50 steps ahead, or whatever --max-seconds allows.",
 )
 @analysis_options
 @click.option(
@@ -260,7 +261,15 @@ def _found(net: Net, asked: _Asked, queries: Sequence[Query]) -> tuple[CheckRepo
     from firable.nets.verdict import Status
 
     with progress_line(asked.progress) as line:
-        found = check_net(net, asked.discipline, asked.budget, method=asked.method, queries=queries, progress=line)
+        found = check_net(
+            net,
+            asked.discipline,
+            asked.budget,
+            method=asked.method,
+            queries=queries,
+            progress=line,
+            tell=None if line is None else line.say,
+        )
     figures = found.figures.to_json()
     if asked.structure:
         status = found.verdict("contact-free").status

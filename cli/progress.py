@@ -2,8 +2,8 @@
 
 It goes to standard error, and by itself only where that is a terminal, so that reports and logs hold nothing of it; it
 begins after a second, because what is done sooner needs no line, and is wiped before the report is printed. Told is
-what the engine counts, markings and edges: how many are still to come nobody knows, so that a bar or a percentage, the
-alternative, would be made up.
+what the engine counts, markings and edges, and which verdict is being settled by itself, with how far that is: how much
+is still to come nobody knows, so that a bar or a percentage, the alternative, would be made up.
 """
 
 from __future__ import annotations
@@ -32,11 +32,15 @@ class ProgressLine:
 
     def __call__(self, n_markings: int, n_edges: int) -> None:
         """Tell how far it is; most calls come too soon after the last to be told."""
+        self.say(f"{n_markings:,} markings, {n_edges:,} edges")
+
+    def say(self, words: str) -> None:
+        """Tell in words how far it is."""
         now = self._clock()
         if now < self._next:
             return
         self._next = now + (EVERY_SECONDS if self._is_terminal else 10 * EVERY_SECONDS)
-        line = f"  {n_markings:,} markings, {n_edges:,} edges, {now - self._began:.0f} s"
+        line = f"  {words}, {now - self._began:.0f} s"
         if self._is_terminal:
             self._stream.write(f"\r{line.ljust(self._width)}")
             self._width = len(line)

@@ -29,7 +29,6 @@ from firable.semantics.player import FiringSet, NotFirableError, Player, holds_i
 from firable.semantics.trace import Discipline
 
 METHOD: Final = "bounded model checking"
-DEPTH_MAX: Final = 1_000
 _COST_MAX: Final = 30_000  # firings played, and transitions looked at, to make a witness shorter
 
 
@@ -39,9 +38,9 @@ def decide_by_bounded_search(
     limits: Limits,
     *,
     discipline: Discipline = Discipline.INTERLEAVING,
-    depth_max: int = DEPTH_MAX,
+    depth_max: int | None = None,
 ) -> Finding:
-    """Look for a run into the goal, of growing length; the finding is a witness or nothing.
+    """Look for a run into the goal, of growing length up to that of the limits; the finding is a witness or nothing.
 
     Cost: a copy of the net for each depth, and whatever the solver needs.
 
@@ -52,13 +51,15 @@ def decide_by_bounded_search(
     (True, 9)
     """
     start, depth = perf_counter(), -1
+    longest = limits.depth_max if depth_max is None else depth_max
     found: Witness | None = None
     try:
         with Session(limits) as session:
             search = BoundedSearch(session, net, goal, discipline)
-            while found is None and depth < depth_max:
+            while found is None and depth < longest:
                 found = search.witness(depth + 1)
                 depth += 1
+                limits.tell(f"no run of up to {depth:,} {_WORDS[discipline]}")
     except LimitReachedError:
         pass
     bound = "" if found else f"no run of up to {depth:,} {_WORDS[discipline]} leads to it" if depth >= 0 else "nothing"

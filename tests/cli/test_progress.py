@@ -2,6 +2,7 @@
 
 import io
 import re
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -176,3 +177,32 @@ def test_ctrl_c_while_a_bundle_is_checked_leaves_the_rest_claimed(
     assert "6 of 6    eq7 " in told
     assert re.search(r"\? claimed +deadlock-free", told)
     assert "interrupted" in told
+
+
+def test_a_technique_that_is_named_tells_how_far_it_is_and_ends_by_itself(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("firable.cli.progress.SILENT_SECONDS", 0.0)
+    monkeypatch.setattr("firable.cli.progress.EVERY_SECONDS", 0.0)
+    monkeypatch.setattr(firable.analysis.check, "ALONE_STEPS", 7)
+    arguments = ["check", "catalogue:one_robot", "--method", "bounded", "--no-cache"]
+    assert main([*arguments, "--progress"]) == 3
+    told = capsys.readouterr()
+    assert "  deadlock-free: no run of up to 7 steps of firings in parallel, " in told.err
+    assert "reached: bounded model checking gave up: no run of up to 7 steps of firings in parallel leads" in told.out
+    assert "reached: bounded model checking does not decide it" in told.out  # whether it is live
+
+
+def test_ctrl_c_in_a_bounded_search_shows_how_far_it_has_come(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupt(_: ProgressLine, words: str) -> None:
+        if words.startswith("deadlock-free: no run of up to 3 "):
+            signal.raise_signal(signal.SIGINT)  # the main thread hears of it
+
+    monkeypatch.setattr(ProgressLine, "say", interrupt)
+    assert main(["check", "catalogue:one_robot", "--method", "bounded", "--no-cache", "--progress"]) == 3
+    told = capsys.readouterr().out
+    assert "\n  interrupted\n" in told
+    assert re.search(r"deadlock-free: bounded model checking gave up: no run of up to \d+ steps", told)
+    assert "reached: bounded model checking was not asked any more" in told
