@@ -191,17 +191,12 @@ def test_who_listens_to_the_page_hears_tokens_machines_and_what_is_missing(chrom
         expect(machines.get_by_role("listitem").filter(has_text="CV2")).to_have_text("CV2 rests")
 
 
-@needs_browser
-def test_of_many_machines_those_in_view_have_bars_and_of_many_firings_no_token_flies(chromium: Browser) -> None:
+def answers(machines: list[str], bars: list[dict[str, object]], **now: object) -> dict[str, object]:
+    """What a server tells of a run with these machines and bars, by the path that is asked."""
     net: dict[str, object] = {"name": "many", "description": "", "controllers": [], "places": [], "signals": []}
     net["transitions"] = [{"name": "t", "says": ""}]
-    machines = [f"M{k}" for k in range(100)]
     start = {"mode": "live", "here": "", "coordinators": [], "net": net, "machines": machines, "top": {"why_not": "no"}}
-    bars = [
-        {"number": k, "machine": name, "command": f"{name} GO", "from": 5.0, "to": 8.0, "end": "done"}
-        for k, name in enumerate(machines)
-    ]
-    now: dict[str, object] = {
+    told: dict[str, object] = {
         "at": 10.0,
         "speed": 1.0,
         "state": "running",
@@ -209,8 +204,6 @@ def test_of_many_machines_those_in_view_have_bars_and_of_many_firings_no_token_f
         "marking": [],
         "signals": [],
         "transitions": {},
-    }
-    now |= {
         "waits": [],
         "bars": bars,
         "votes": [],
@@ -219,12 +212,23 @@ def test_of_many_machines_those_in_view_have_bars_and_of_many_firings_no_token_f
         "asked": {},
         "paused": False,
         "ended": True,
+        "events": [],
+        "fired": [],
+        **now,
     }
-    now |= {"events": [], "fired": ["t"] * 20}
     svg = '<svg xmlns="http://www.w3.org/2000/svg" width="9" height="99"><path id="input:t:p" d="M0 0h9"/></svg>'
-    answers = {"page": start, "picture": {"picture": svg, "members": {}, "foldable": []}, "events": now}
+    return {"page": start, "picture": {"picture": svg, "members": {}, "foldable": []}, "events": told}
+
+
+@needs_browser
+def test_of_many_machines_those_in_view_have_bars_and_of_many_firings_no_token_flies(chromium: Browser) -> None:
+    machines = [f"M{k}" for k in range(100)]
+    bars: list[dict[str, object]] = [
+        {"number": k, "machine": name, "command": f"{name} GO", "from": 5.0, "to": 8.0, "end": "done"}
+        for k, name in enumerate(machines)
+    ]
     with command("view", "catalogue:one_robot", "--no-browser") as (address, _), page_at(chromium, address) as page:
-        for path, answer in answers.items():
+        for path, answer in answers(machines, bars, fired=["t"] * 20).items():
             page.route(f"**/api/{path}", partial(fulfilled, json.dumps(answer) + "\n"))
         page.reload()
         shown = page.locator(".lanes g > title")
@@ -236,6 +240,26 @@ def test_of_many_machines_those_in_view_have_bars_and_of_many_firings_no_token_f
         expect(shown.filter(has_text="M99 GO: 3.0 s")).to_have_count(1)
         expect(shown.filter(has_text="M0 GO: 3.0 s")).to_have_count(0)
         expect(page.get_by_role("listitem").filter(has_text="M50")).to_have_text("M50 rests")
+
+
+@needs_browser
+def test_what_stands_on_a_bar_that_began_a_minute_ago_is_seen_whole(chromium: Browser) -> None:
+    long = {"number": 0, "machine": "M", "command": "M MILL", "from": 11.0, "to": 60.0, "end": "done"}
+    short = {"number": 1, "machine": "M", "command": "M GO", "from": 61.0, "to": 69.0, "end": "done"}
+    told = answers(["M"], [long, short], at=70.0, ended=False)
+    later = answers(["M"], [], at=74.0)["events"]
+    events = iter([told["events"], later])
+    with command("view", "catalogue:one_robot", "--no-browser") as (address, _), page_at(chromium, address) as page:
+        for path in ("page", "picture"):
+            page.route(f"**/api/{path}", partial(fulfilled, json.dumps(told[path]) + "\n"))
+        page.route("**/api/events", lambda route: fulfilled(json.dumps(next(events)) + "\n", route))
+        page.reload()
+        expect(page.get_by_text("The run has ended after 74 seconds")).to_be_visible()
+        window = page.locator(".lane-window").bounding_box()
+        label = page.locator(".lanes .command").filter(has_text="MILL").bounding_box()
+        assert window is not None
+        assert label is not None
+        assert window["x"] <= label["x"] < window["x"] + 40
 
 
 @needs_browser

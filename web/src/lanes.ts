@@ -2,6 +2,7 @@
 //
 // A bar is drawn once, and again when its command ends. What moves is the strip that all of them stand on, by one
 // transform that the compositor carries out; a bar of which the command is under way goes on beyond now, out of sight.
+// What stands on a bar of which the beginning has gone out of sight is put where it is seen whole, now and then.
 // Of many machines only the lanes that are in view have bars.
 
 import { h, svg } from "./dom";
@@ -20,6 +21,14 @@ const SHOWN_SECONDS = 60;
 const DRAWN_SECONDS = 90;
 const HEIGHT = 26;
 const LETTER_WIDTH = 6.4;
+const LABEL_SECONDS = 1;
+
+/** What stands on a bar: where, and where the bar ends. */
+interface Label {
+  text: SVGTextElement;
+  x: number;
+  end: number;
+}
 
 interface Lane {
   top: number;
@@ -33,6 +42,8 @@ export class Lanes {
   private readonly window: HTMLElement;
   private readonly lanes = new Map<string, Lane>();
   private readonly bars = new Map<number, { bar: Bar; group: SVGGElement }>();
+  private readonly labels = new Map<number, Label>();
+  private looked = 0;
   private origin = 0;
   private now = 0;
   private scale = 0;
@@ -87,16 +98,33 @@ export class Lanes {
   at(now: number): void {
     this.now = now;
     if (now < this.origin || now - this.origin > DRAWN_SECONDS) this.drawAll();
+    if (Math.abs(now - this.looked) >= LABEL_SECONDS / 2) this.keepLabels();
     if (this.scale > 0) this.strip.style.transform = `translateX(${((this.origin - now) * this.scale).toFixed(1)}px)`;
+  }
+
+  /** Put labels that are about to leave on the left where they are seen whole, as long as there is room for them. */
+  private keepLabels(): void {
+    this.looked = this.now;
+    const edge = (this.now - this.origin - SHOWN_SECONDS) * this.scale;
+    for (const [number, label] of this.labels) {
+      if (label.x >= edge + 5 + (LABEL_SECONDS / 2) * this.scale) continue;
+      label.x = edge + 5 + LABEL_SECONDS * this.scale;
+      label.text.setAttribute("x", String(label.x));
+      if (label.x + label.text.textContent.length * LETTER_WIDTH + 3 <= label.end) continue;
+      label.text.remove();
+      this.labels.delete(number);
+    }
   }
 
   private drawAll(): void {
     this.origin = this.now;
     this.strip.replaceChildren();
+    this.labels.clear();
     for (const [number, { bar, group }] of this.bars) {
       if (bar.to !== null && bar.to < this.now - SHOWN_SECONDS) this.bars.delete(number);
       else this.draw(bar, group, this.lanes.get(bar.machine)!);
     }
+    this.keepLabels();
     this.at(this.now);
   }
 
@@ -109,10 +137,12 @@ export class Lanes {
     title.textContent = `${bar.command}: ${bar.to === null ? "working" : `${(bar.to - bar.from).toFixed(1)} s`}`;
     group.replaceChildren(title, svg("rect", { x, y: top + 3, width, height: HEIGHT - 7, rx: 4, class: `bar ${bar.end}` }));
     const words = bar.command.slice(bar.machine.length + 1);
+    this.labels.delete(bar.number);
     if (width > words.length * LETTER_WIDTH + 8) {
-      const label = svg("text", { x: x + 5, y: top + 17, class: "command" });
-      label.textContent = words;
-      group.append(label);
+      const text = svg("text", { x: x + 5, y: top + 17, class: "command" });
+      text.textContent = words;
+      group.append(text);
+      this.labels.set(bar.number, { text, x: x + 5, end: x + width });
     }
     this.strip.append(group);
   }
