@@ -27,6 +27,7 @@ T = TypeVar("T")
 SLICES_SECONDS: Final = (2.0, 10.0, 60.0)
 """How long each technique may try in each round of its lane."""
 _TURN_SECONDS: Final = 0.1
+_START_SECONDS: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,9 +67,11 @@ def race(
         Thread(target=course.go, args=(lane, share, slices_seconds, end), daemon=True)
         for lane, end in zip(filter(None, lanes), ends, strict=True)
     ]
+    begun: list[Thread] = []
     interrupted = False
     try:
         for thread in threads:
+            begun.append(thread)
             thread.start()
         # Not by `join`: Ctrl-C in the midst of it has a thread that runs on taken for one that has ended (bpo-45274).
         for end in ends:
@@ -79,7 +82,9 @@ def race(
         interrupted = True
     finally:
         course.over.set()
-        for thread, end in zip(threads, ends, strict=True):
+        for thread, end in zip(begun, ends, strict=False):
+            if thread.ident is None:
+                end.wait(_START_SECONDS)  # Ctrl-C came while it was started, which it may have been
             if thread.ident is not None:
                 end.wait()
     if course.failure is not None:

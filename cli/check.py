@@ -82,8 +82,9 @@ class _Asked:
     type=OneOf([str(method) for method in Method]),
     default=str(Method.AUTO),
     show_default=True,
-    help="Let one technique answer; `auto` lets them race where exploring a moment does not suffice. One alone has a "
-    "minute for each question, and `bounded` looks 50 steps ahead, or whatever --max-seconds allows.",
+    help="Let one technique answer; `auto` lets them race where exploring a moment does not suffice. One that is "
+    "asked question by question has a minute for each, and `bounded` looks 50 steps ahead, or whatever --max-seconds "
+    "allows.",
 )
 @analysis_options
 @click.option(

@@ -11,7 +11,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
-from threading import Event, Thread
+from shutil import get_terminal_size
+from threading import Event, Lock, Thread
 from time import monotonic
 from typing import Final, TextIO
 
@@ -20,7 +21,7 @@ EVERY_SECONDS: Final = 0.2
 
 
 class ProgressLine:
-    """Writes how many markings and edges were found: over itself on a terminal, else line by line."""
+    """Writes how many markings and edges were found: over itself on a terminal, else line by line; for any thread."""
 
     def __init__(self, stream: TextIO, clock: Callable[[], float] = monotonic) -> None:
         self._stream = stream
@@ -29,6 +30,7 @@ class ProgressLine:
         self._began = clock()
         self._next = self._began + SILENT_SECONDS
         self._width = 0
+        self._turn = Lock()
 
     def __call__(self, n_markings: int, n_edges: int) -> None:
         """Tell how far it is; most calls come too soon after the last to be told."""
@@ -36,17 +38,19 @@ class ProgressLine:
 
     def say(self, words: str) -> None:
         """Tell in words how far it is."""
-        now = self._clock()
-        if now < self._next:
-            return
-        self._next = now + (EVERY_SECONDS if self._is_terminal else 10 * EVERY_SECONDS)
-        line = f"  {words}, {now - self._began:.0f} s"
-        if self._is_terminal:
-            self._stream.write(f"\r{line.ljust(self._width)}")
-            self._width = len(line)
-        else:
-            self._stream.write(f"{line}\n")
-        self._stream.flush()
+        with self._turn:
+            now = self._clock()
+            if now < self._next:
+                return
+            self._next = now + (EVERY_SECONDS if self._is_terminal else 10 * EVERY_SECONDS)
+            line = f"  {words}, {now - self._began:.0f} s"
+            if self._is_terminal:
+                line = line[: get_terminal_size().columns - 1]  # of a line that is broken the rest could not be wiped
+                self._stream.write(f"\r{line.ljust(self._width)}")
+                self._width = len(line)
+            else:
+                self._stream.write(f"{line}\n")
+            self._stream.flush()
 
     def wipe(self) -> None:
         """Take the line off the terminal."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import re
 import stat
+from codecs import BOM_UTF8
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -89,9 +90,8 @@ def source_of(path: str | Path, data: bytes) -> Source:
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise _no_text(
-            path, data, error.start, f"not UTF-8 text: byte {error.start} is 0x{data[error.start]:02x}"
-        ) from None
+        at = error.start + (len(BOM_UTF8) if data.startswith(BOM_UTF8) else 0)  # it is counted from behind the mark
+        raise _no_text(path, data, at, f"not UTF-8 text: byte {at} is 0x{data[at]:02x}") from None
     if "\0" in text:
         raise _no_text(path, data, (at := data.index(0)), f"not text: byte {at} is NUL")
     return Source(str(path), text)

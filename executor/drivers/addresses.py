@@ -21,7 +21,7 @@ from firable.nets.source import quoted
 
 _LABEL: Final = r"\w(?:[\w-]{0,61}\w)?"
 _NAME: Final = re.compile(rf"{_LABEL}(?:\.{_LABEL})*\.?")
-_FIGURES: Final = re.compile(r"[0-9.]+")
+_FIGURES: Final = re.compile(r"[\d.]+")
 _OPCUA: Final = "opc.tcp"
 
 
@@ -59,7 +59,8 @@ def _host(text: str) -> str:
 def _opcua_url(text: str) -> str:
     try:
         parts = urlsplit(text)
-        is_right = parts.scheme == _OPCUA and is_host(parts.hostname or "") and bool(parts.port)
+        is_whole = text.isprintable() and " " not in text  # the parser leaves blanks out, and a server does not
+        is_right = is_whole and parts.scheme == _OPCUA and is_host(parts.hostname or "") and bool(parts.port)
     except ValueError:  # figures that are no port, a bracket that is not closed
         is_right = False
     if not is_right:

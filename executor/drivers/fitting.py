@@ -4,17 +4,17 @@ A signal that is not bound would never change, and a command that is not bound w
 like a machine that is slow. So both are refused before anything is connected, all together, with their lines.
 
 So are two commands that are written alike, such as a stop that was copied from the line of a start and not edited: the
-machine would do the one for the other. Only words are compared, for a gripper may close in one way wherever it is.
+machine would do the one for the other. Only machine and word are compared: a gripper may close in one way everywhere.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from firable.executor.drivers.binding import ACKNOWLEDGED, Binding
+from firable.executor.drivers.binding import ACKNOWLEDGED, Binding, writes
 from firable.executor.drivers.device import Point
 from firable.nets.diagnostics import Diagnostic, did_you_mean
-from firable.nets.net import Net, Place, SignalKind
+from firable.nets.net import Command, Net, Place, SignalKind
 
 
 def misfits(binding: Binding, net: Net) -> tuple[Diagnostic, ...]:
@@ -79,19 +79,23 @@ def _unanswered(binding: Binding, place: Place) -> Iterator[Diagnostic]:
 
 
 def _alike(binding: Binding, places: Iterable[Place]) -> Iterator[Diagnostic]:
-    """Commands of different words that are written alike, where the channel does not send the words themselves."""
+    """Commands of different machines or words that are written alike, where the channel does not send the words."""
     document = binding.document
     written: dict[tuple[str, str, frozenset[tuple[Point, object]]], Place] = {}
     for place in places:
         bound = document.commands[place.name]
         if place.command is None or document.devices[bound.device].channels[bound.channel].command is not None:
             continue
-        values = frozenset((point, value) for point, value in bound.write.items())
+        values = frozenset(writes(bound.write))
         first = written.setdefault((bound.device, bound.channel, values), place)
-        if first.command is None or first.command.command == place.command.command:
+        if first.command is None or _word(first.command) == _word(place.command):
             continue
         told = ", ".join(f"{point}: {value}" for point, value in bound.write.items()) or "nothing but a number"
         message = f"{place.command} of '{place.name}' is written as {first.command} of '{first.name}' is: {told}"
         hint = "the machine cannot tell them apart: write what is meant by each, or give them one word in the net"
         key = ("write",) if bound.write else ()
         yield binding.problem("F5102", ("commands", place.name, *key), message, hint)
+
+
+def _word(command: Command) -> tuple[str, str]:
+    return command.machine, command.command

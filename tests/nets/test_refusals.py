@@ -1,5 +1,6 @@
 """Golden diagnostics: each kind of malformed net file, with its code, its place and the start of its hint."""
 
+from codecs import BOM_UTF8
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -252,12 +253,15 @@ def test_a_binary_file_is_refused(tmp_path: Path) -> None:
 
 def test_the_first_byte_that_is_no_text_is_told_with_its_line_and_column(tmp_path: Path) -> None:
     path = tmp_path / "cell.firable.yaml"
-    path.write_bytes("firable: 1\r\ncell: é".encode() + b"\xdf\n")
-    with pytest.raises(InputError) as refused:
-        read_net(path)
-    span = refused.value.diagnostics[0].span
-    assert span is not None
-    assert (span.line, span.column, span.excerpt) == (2, 8, "cell: é\N{REPLACEMENT CHARACTER}")
+    for mark in (b"", BOM_UTF8):
+        path.write_bytes(mark + "firable: 1\r\ncell: é".encode() + b"\xdf\n")
+        with pytest.raises(InputError) as refused:
+            read_net(path)
+        (problem,) = refused.value.diagnostics
+        assert problem.span is not None
+        assert problem.message == f"not UTF-8 text: byte {20 + len(mark)} is 0xdf"
+        assert (problem.span.line, problem.span.column) == (2, 8)
+        assert problem.span.excerpt == "cell: é\N{REPLACEMENT CHARACTER}"
 
 
 def test_noise_of_100_megabytes_is_refused_unread(tmp_path: Path) -> None:

@@ -228,7 +228,7 @@ fn every_operation_agrees_with_sets_of_masks() {
         for (set, node) in [(&reach, root), (&within, within_node), (&Set::new(), EMPTY)] {
             let counts: Vec<u64> =
                 tests.iter().map(|test| set.iter().filter(|&&m| passes(test, m)).count() as u64).collect();
-            let found = watched(|watch| both.space.counts(node, &tests, watch));
+            let found = watched(|watch| both.space.counts(&[], node, &tests, watch));
             assert_eq!(found.iter().map(|count| count.first().copied().unwrap_or(0)).collect::<Vec<_>>(), counts);
         }
 
@@ -348,7 +348,7 @@ fn tests_are_counted_exactly_in_128_bits_and_beyond() {
             (vec![0], vec![0]),
             (initial.clone(), vec![]),
         ];
-        let counts = watched(|watch| space.counts(reach, &tests, watch));
+        let counts = watched(|watch| space.counts(&[], reach, &tests, watch));
         let powers = [Some(machines), Some(machines - 1), (machines > 1).then(|| machines - 2), None, None, Some(0)];
         for (count, power) in counts.iter().zip(powers) {
             assert_eq!(bits(count), power.map_or(0, |power| power as usize + 1), "{machines}");

@@ -159,7 +159,7 @@ def _address(binding: Binding, name: str) -> tuple[str, int | str]:
             message = f"`driver: {driver}` leads to nothing that can be served on this host"
             hint = "let the binding be made: name the protocols, such as --modbus --opcua"
             raise InputError([binding.problem("F5104", ("devices", name, "driver"), message, hint)])
-    return HERE if host == "localhost" else str(host), int(port)
+    return HERE if str(host).lower() == "localhost" else str(host), int(port)
 
 
 def _refuse_what_is_elsewhere(binding: Binding, name: str) -> None:

@@ -48,8 +48,8 @@ class PseudoLine:
         if self.link:
             link = Path(self.link)
             try:
-                if link.is_symlink() and not link.exists():
-                    link.unlink()  # of a line that is gone with its process
+                if link.is_symlink() and _is_left_behind(link.readlink(), self.near):
+                    link.unlink()
                 link.symlink_to(self.near)
             except OSError as error:
                 self.close()
@@ -71,3 +71,8 @@ class PseudoLine:
             some = os.read(source, 4096)
             if self.passes:
                 os.write(target, some)
+
+
+def _is_left_behind(target: Path, near: str) -> bool:
+    """Whether a link is that of a line that went with its process: its terminal is gone, or the new line's now."""
+    return target.parent == Path(near).parent and (not target.exists() or target == Path(near))

@@ -13,14 +13,14 @@ from firable.executor.drivers.binding import parse_binding, read_binding
 from firable.executor.drivers.bound import BoundDriver, bound_driver
 from firable.executor.drivers.device import files_of
 from firable.executor.drivers.far_side.ends import ends_of
+from firable.executor.drivers.fitting import misfits
 from firable.executor.drivers.modbus import ModbusTcp
 from firable.executor.drivers.opcua import OpcUa
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.diagnostics import InputError
 from firable.nets.text import parse_net
 
-NET = parse_net(
-    """
+NET_TEXT = """
 firable: 1
 cell: c
 controllers:
@@ -33,7 +33,7 @@ transitions:
   t2: {from: M.move, to: M.stop}
   t3: {from: M.stop, to: M.idle}
 """
-)
+NET = parse_net(NET_TEXT)
 
 GOOD = """firable_bind: 1
 cell: c
@@ -124,6 +124,8 @@ def test_what_is_no_binding_is_refused_where_it_stands(old: str, new: str, found
         ("driver: opcua\n    url: opc.tcp:/plc:4840", "write it such as `opc.tcp://192.168.0.10:4840/`"),
         ("driver: opcua\n    url: plc:4840", "write it such as"),
         ("driver: opcua\n    url: opc.tcp://plc", "write it such as"),
+        ("driver: opcua\n    url: 'opc.tcp://plc:4840/ '", "write it such as"),
+        ("driver: mqtt\n    host: '\uff11\uff12.0.0.1'", "write the name or the address of a host"),
         ("driver: opcua\n    url: opc.tcp://plc:484O", "write it such as"),
         ("driver: opcua\n    url: opc.tcp://:4840", "write it such as"),
         ("driver: opcua\n    url: 'opc.tcp://[::1:4840'", "write it such as"),
@@ -280,6 +282,18 @@ def test_commands_of_different_words_that_a_machine_cannot_tell_apart_are_refuse
     bare = GOOD.replace(", write: {holding 2: 7}", "").replace(", write: {holding 2: 8}", "")
     assert refusal(bare, fit=True) == [("F5102", "18: M.stop")]
     bound_driver(parse_binding(bare.replace("M: {number: holding 1", "M: {command: holding 1")), NET)
+    alike = GOOD.replace("{holding 2: 7}", "{coil 2: true}").replace("{holding 2: 8}", "{coil 2: 1}")
+    assert refusal(alike, fit=True) == [("F5102", "18: write")]
+
+
+def test_commands_of_different_machines_that_are_written_alike_are_refused_and_one_at_two_places_is_not() -> (
+    None
+):
+    stop = "command: STOP"
+    for other, is_refused in (("{machine: M, command: MOVE}", False), ("{machine: N, command: MOVE}", True)):
+        net = parse_net(NET_TEXT.replace(f"{{machine: M, {stop}}}", other))
+        binding = parse_binding(edited("{holding 2: 8}", "{holding 2: 7}"))
+        assert [problem.code for problem in misfits(binding, net)] == (["F5102"] if is_refused else [])
 
 
 STOP = "emergency_stop:\n  door: {device: plc, read: discrete 3}\nsignals:"

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -26,6 +27,26 @@ class TestSerialLine(DriverConformance):
         end.line.open()
         points = {role: f"M.{role}" for role in (*ROLES, "command")}
         yield Far(end, f"driver: serial, port: {end.line.near}", points)
+
+
+def test_a_link_to_a_line_replaces_that_of_a_line_which_went_with_its_process_and_no_other(tmp_path: Path) -> None:
+    async def main() -> None:
+        line = PseudoLine(str(link := tmp_path / "robot.line"))
+        line.open()
+        near, gone = Path(line.near), Path(line.near).with_name("987654")
+        line.close()
+        assert not link.is_symlink()
+        for left in (gone, near):  # the system gives the same terminal again
+            link.symlink_to(left)
+            line.open()
+            assert link.readlink() == Path(line.near)
+            line.close()
+        link.symlink_to(unplugged := tmp_path / "ttyUSB0")
+        with pytest.raises(OSError, match="cannot be made to lead to a line: File exists"):
+            line.open()
+        assert link.readlink() == unplugged
+
+    asyncio.run(main())
 
 
 @pytest.mark.parametrize("kind", [serial_line.KIND, modbus.RTU], ids=["serial", "modbus-rtu"])

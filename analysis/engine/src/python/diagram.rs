@@ -267,7 +267,7 @@ impl Diagram {
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
         let set = self.mine(markings)?;
         self.tested(&tests)?;
-        let counts = self.shared.work(py, |space, _, watch| space.counts(set, &tests, watch))?;
+        let counts = self.shared.work(py, |space, roots, watch| space.counts(roots, set, &tests, watch))?;
         counts.iter().map(|count| int(py, count)).collect()
     }
 

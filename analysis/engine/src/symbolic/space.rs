@@ -322,23 +322,26 @@ impl Symbolic {
     /// For each test, in how many markings of a set its first places are full and its second ones empty.
     pub fn counts(
         &mut self,
+        roots: &[Node],
         set: Node,
         tests: &[(Vec<u32>, Vec<u32>)],
         watch: &mut Watch<'_>,
     ) -> Result<Vec<Natural>, Stop> {
-        let mut counts = vec![Natural::new(); tests.len()];
-        let (mut at, mut events) = (Vec::new(), Vec::new());
-        for (number, event) in self.events_of(tests)?.into_iter().enumerate() {
-            if let Some(event) = event {
-                at.push(number);
-                events.push(event);
+        self.again(roots, &[set], |space, _| {
+            let mut counts = vec![Natural::new(); tests.len()];
+            let (mut at, mut events) = (Vec::new(), Vec::new());
+            for (number, event) in space.events_of(tests)?.into_iter().enumerate() {
+                if let Some(event) = event {
+                    at.push(number);
+                    events.push(event);
+                }
             }
-        }
-        let Ordered { diagram, suffixes, .. } = &self.ordered;
-        for (number, count) in at.into_iter().zip(passing(diagram, suffixes, &events, set, watch)?) {
-            counts[number] = count;
-        }
-        Ok(counts)
+            let Ordered { diagram, suffixes, .. } = &space.ordered;
+            for (number, count) in at.into_iter().zip(passing(diagram, suffixes, &events, set, watch)?) {
+                counts[number] = count;
+            }
+            Ok(counts)
+        })
     }
 
     /// The suffixes of tests; None where a place would have to be both full and empty.

@@ -312,7 +312,11 @@ impl Symbolic {
             return Ok(walk);
         }
         let effort = Effort { results: LAYERS_WORK, markings: HOLLOW_MAX, firings: walk.firings.len() };
-        Ok(self.toward(roots, end, moves, effort, watch)?.unwrap_or(walk))
+        match self.toward(roots, end, moves, effort, watch) {
+            Ok(shorter) => Ok(shorter.unwrap_or(walk)),
+            Err(Stop::Memory | Stop::Time) => Ok(walk), // it shows the deadlock all the same
+            Err(stop) => Err(stop),
+        }
     }
 
     fn downhill(
