@@ -286,9 +286,7 @@ def test_commands_of_different_words_that_a_machine_cannot_tell_apart_are_refuse
     assert refusal(alike, fit=True) == [("F5102", "18: write")]
 
 
-def test_commands_of_different_machines_that_are_written_alike_are_refused_and_one_at_two_places_is_not() -> (
-    None
-):
+def test_commands_of_different_machines_that_are_written_alike_are_refused_and_one_at_two_places_is_not() -> None:
     stop = "command: STOP"
     for other, is_refused in (("{machine: M, command: MOVE}", False), ("{machine: N, command: MOVE}", True)):
         net = parse_net(NET_TEXT.replace(f"{{machine: M, {stop}}}", other))
