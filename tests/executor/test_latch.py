@@ -8,6 +8,7 @@ import time
 from collections.abc import Awaitable, Callable
 from functools import partial
 
+import pytest
 from support.served_cells import DECOMPOSITION, NET, Served, served
 
 from firable.executor.drivers.bench import until
@@ -151,7 +152,7 @@ def test_emergency_stop_ends_a_run_that_nobody_could_reset() -> None:
     asyncio.run(main())
 
 
-def test_time_of_a_run_goes_on_while_its_next_life_is_begun() -> None:
+def test_time_of_a_run_goes_on_while_its_next_life_is_begun(monkeypatch: pytest.MonkeyPatch) -> None:
     async def main() -> None:
         stream = io.StringIO()
         subnets = DECOMPOSITION.subnets
@@ -165,7 +166,7 @@ def test_time_of_a_run_goes_on_while_its_next_life_is_begun() -> None:
             host.note("unwatched")
             begin(resume=resume)
 
-        host.begin = begin_slowly  # type: ignore[method-assign]
+        monkeypatch.setattr(host, "begin", begin_slowly)
         run = asyncio.create_task(host.main())
         await until(lambda: sum(recorder.firings.values()) > 5, "firings")
         host.emergency_stop("a person")

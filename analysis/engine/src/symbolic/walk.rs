@@ -231,7 +231,7 @@ impl Symbolic {
         Walk { firings, reached, shortest }
     }
 
-    /// The same by the layers that so much work makes, and for which there is memory: other ways need less.
+    /// A shortest sequence, if so much work and the memory suffice for its layers; other ways need less of both.
     fn by_some_layers(
         &mut self,
         roots: &[Node],
