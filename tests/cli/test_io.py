@@ -222,7 +222,7 @@ def test_binding_by_hand_with_each_machine_behind_a_protocol_of_its_own_is_serve
         text = text.replace(was, is_now)
     bind, bundle = tmp_path / "own.bind.yaml", tmp_path / "cell.bundle"
     bind.write_text(text)
-    lines[0].symlink_to(tmp_path / "a line whose process was killed")
+    lines[0].symlink_to("/dev/pts/a terminal that went with its process")
     assert main(["bundle", "catalogue:one_robot", "-o", str(bundle)]) == 0
     serving = firable("sim", "catalogue:one_robot", "--bind", str(bind), "--workpieces", "1", "--speed", "10")
     served = Cell(serving, bind)

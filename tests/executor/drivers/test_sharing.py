@@ -102,7 +102,9 @@ def test_a_device_without_anything_that_stops_it_is_shared_by_channels_of_their_
     part = own_net(decomposition, ["a"])
     driver = bound_driver(parse_binding(BINDING), TWO, part)
     assert set(driver.devices) == {"plc", "door"}
-    one_channel = BINDING.replace("b.lit: {device: plc, channel: M}", "b.lit: {device: plc, channel: L}")
+    one_channel = BINDING.replace(
+        "b.lit: {device: plc, channel: M}", "b.lit: {device: plc, channel: L, write: {coil 7: 1}}"
+    )
     assert refused(parse_binding(one_channel), TWO, part) == [
         (
             "F5105",
