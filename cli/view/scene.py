@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from firable.cli.view.site import refusal
-from firable.nets.machines.plant_file import Carry, Grasp, Move, PlantModel, Process, Put, Release, Stop
+from firable.nets.machines.plant_file import Carry, Grasp, Move, PlantModel, Process, Put, Release
 from firable.nets.net import Net, Place
 
 
@@ -78,8 +78,6 @@ class Stage:
         machine = place.command.machine
         if machine in scene.busy:
             scene = self.done(scene, scene.busy[machine])
-        if isinstance(action, Stop):
-            return scene
         if isinstance(action, Carry) and scene.on(machine) is None:
             scene = self._arrives(scene, action.source) if action.source == self.plant.arrivals.station else scene
             scene = scene.moved(action.source, machine)
@@ -180,7 +178,7 @@ class Stage:
                 "command": str(place.command),
                 "from": action.source if isinstance(action, Carry) else "",
                 "to": action.target if isinstance(action, Carry) else dict(place.command.parameters).get("to", ""),
-                "takes_s": 0.0 if isinstance(action, Stop) else action.takes_s,
+                "takes_s": action.takes_s,
             }
         return {"scene": scene.to_json(), "doing": doing, "words": self.words(scene)}
 

@@ -137,7 +137,7 @@ class Plant(Things):
         name, action = self.machine_of(place), self.action(place)
         at, has = f"at {name}", f"has {name}"
         if isinstance(action, Stop):
-            yield {at: None}
+            yield {at: None if place.name in self.stops else place.name}
         elif state[at] is not None:
             yield {OVERRUN: True}
         elif isinstance(action, (Grasp, Put)):

@@ -82,7 +82,7 @@ class Things:
         return found
 
     def values(self, thing: str) -> list[Value]:
-        """The values that a thing may have; no machine is ever at a command that stops it."""
+        """The values that a thing may have; no machine is ever at a command that stops it at once."""
         places = self.things[thing]
         if all(isinstance(value, bool) for value in places):
             return [False, True]
@@ -103,8 +103,9 @@ class Things:
 
     @cached_property
     def stops(self) -> set[str]:
-        """Those whose command stops the machine."""
-        return {place.name for place in self.commanding if isinstance(self.action(place), Stop)}
+        """Those whose command stops the machine at once: it takes no time, and nobody waits for its end."""
+        some = ((place, self.action(place)) for place in self.commanding if place.completion is None)
+        return {place.name for place, one in some if isinstance(one, Stop) and not one.takes_s and not one.jitter_s}
 
     @cached_property
     def failing(self) -> tuple[Place, ...]:

@@ -12,11 +12,12 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from heapq import heappop, heappush
 
 from firable.executor.cell.disturbances import Disturbance, Disturbances, StuckSensor
 from firable.nets.machines.plant_file import (
+    Action,
     Carry,
     Clamp,
     Grasp,
@@ -76,6 +77,8 @@ class _Busy:
     parameters: Mapping[str, str]
     ticket: Ticket
     waits: bool = False
+    breaks_off: bool = False
+    """Whether it is a stop that came while the machine was at another command."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,10 +268,11 @@ class Plant:
             raise _FaultError(f"{name} does not know the command {busy.command}")
         machine.times[busy.command] = machine.times.get(busy.command, 0) + 1
         if isinstance(action, Stop):
-            for key, sensor in self._keys(name) if machine.busy is not None else ():
-                self._in(sensor.after_s, 0.0, _Press(key))
-            machine.busy = None
-            yield CommandDone(busy.ticket)
+            machine.busy = busy = replace(busy, breaks_off=self._has_something_to_end(machine))
+            if action.takes_s + action.jitter_s or self._hangs(name, busy):
+                self._take_time(name, busy, action)
+            else:
+                yield from self._finish(name, busy)  # before anything else comes
             return
         if machine.busy is not None:
             raise _FaultError(f"{name} is given {busy.command} while it is at {machine.busy.command}")
@@ -294,10 +298,21 @@ class Plant:
                     raise _FaultError(f"{name} machines workpiece {workpiece.id}, which is not clamped")
                 if workpiece.processed:
                     raise _FaultError(f"{name} machines workpiece {workpiece.id} a second time")
-        if (hangs := self.disturbances.hangs(name, busy.command, machine.times[busy.command])) is None:
+        self._take_time(name, busy, action)
+
+    def _take_time(self, name: str, busy: _Busy, action: Action) -> None:
+        if (hangs := self._hangs(name, busy)) is None:
             self._in(action.takes_s, action.jitter_s, _Finish(name, busy))
         else:
             self.befallen.append((hangs, f"{name} has {busy.command} and will never end it"))
+
+    def _hangs(self, name: str, busy: _Busy) -> Disturbance | None:
+        return self.disturbances.hangs(name, busy.command, self.machines[name].times[busy.command])
+
+    def _has_something_to_end(self, machine: _MachineNow) -> bool:
+        """Whether a stop leaves something undone; one that is not over yet has nothing to do but what it broke off."""
+        at = machine.busy
+        return at is not None and (at.breaks_off or not isinstance(machine.model.commands[at.command], Stop))
 
     def _finish(self, name: str, busy: _Busy) -> Iterator[PlantReport]:
         machine = self.machines[name]
@@ -313,12 +328,12 @@ class Plant:
             case Put(when_full=when_full):
                 station = machine.model.positions[busy.parameters["at"]]
                 if when_full == "wait" and self._full(station):
-                    machine.busy = _Busy(busy.command, busy.parameters, busy.ticket, waits=True)
+                    machine.busy = replace(busy, waits=True)
                     return
                 self._lay(name, machine, station)
             case Carry(target=target, when_full=when_full):
                 if when_full == "wait" and self._full(target):
-                    machine.busy = _Busy(busy.command, busy.parameters, busy.ticket, waits=True)
+                    machine.busy = replace(busy, waits=True)
                     return
                 self._lay(name, machine, target)
             case Clamp(station=station):
@@ -333,6 +348,8 @@ class Plant:
             self.befallen.append((drops, f"{name} drops {held}, as {busy.command} ends"))
             machine.holding = None
         machine.busy = None
+        for key, sensor in self._keys(name) if busy.breaks_off else ():
+            self._in(sensor.after_s, 0.0, _Press(key))
         yield CommandDone(busy.ticket)
 
     def _position(self, machine: _MachineNow, name: str, busy: _Busy, parameter: str) -> str:

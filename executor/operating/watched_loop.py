@@ -24,7 +24,7 @@ from typing import Final
 from firable.nets.machines.closing import close
 from firable.nets.machines.laws import PLANT, Laws
 from firable.nets.machines.loop import Sending
-from firable.nets.machines.plant_file import Carry, PlantModel, Put, Stop
+from firable.nets.machines.plant_file import Carry, PlantModel, Put
 from firable.nets.net import Marking, Net
 
 REMEMBERED: Final = 10_000
@@ -119,7 +119,7 @@ class WatchedLoop:
 
     def _work(self, laws: Laws, place: str, at: Mapping[str, str]) -> Work:
         action = laws.action(self.net.place(place))
-        if isinstance(action, Stop):
+        if place not in at:  # a stop at once
             return Work(0, math.inf, 0)
         target = None
         if isinstance(action, Carry | Put) and action.when_full == "wait":

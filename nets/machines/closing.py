@@ -132,15 +132,12 @@ class _Closing:
             MappingProxyType(self.accidents),
             MappingProxyType(self.shown),
             MappingProxyType(
-                {place.name: self.laws.busy(place) for place in self.laws.commanding if self.moving(place)}
+                {place.name: self.laws.busy(place) for place in self.laws.commanding if self.laws.lasts(place)}
             ),
             MappingProxyType(self.failed),
             MappingProxyType(self.acknowledged),
             MappingProxyType(self.unsent),
         )
-
-    def moving(self, place: Place) -> bool:
-        return not isinstance(self.laws.action(place), Stop)
 
     def places(self) -> Iterator[Place]:
         """The signals, and the places of the plant."""
@@ -256,7 +253,7 @@ class _Closing:
         calm = Case(((ACCIDENT, False), (OVERRUN, False)))
         start = each([NOTHING], [calm])
         for place in self.laws.commanding:
-            if not self.moving(place):
+            if not self.laws.lasts(place):
                 continue
             name, _ = self.laws.machine(place)
             busy, idle = self.laws.busy(place), self.laws.idle(name)

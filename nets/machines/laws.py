@@ -82,6 +82,12 @@ class Laws:
         """What the command of a place does."""
         return self.machine(place)[1].commands[_command(place).command]
 
+    def lasts(self, place: Place) -> bool:
+        """Whether the machine is at the command of a place for a while: of all but a stop at once, of which nobody
+        waits for the end."""
+        action = self.action(place)
+        return not isinstance(action, Stop) or place.completion is not None or action.takes_s + action.jitter_s > 0
+
     def busy(self, place: Place) -> str:
         """The place that says that the machine is at the command of a place of the cell."""
         return f"{PLANT}.{_command(place).machine}.at.{place.name}"
@@ -142,12 +148,7 @@ class Laws:
         """The ways in which a machine can take the command of a place."""
         name, action = self.machine(place)[0], self.action(place)
         if isinstance(action, Stop):
-            yield Case(((self.idle(name), True),), tag=f"{name}-idle")
-            for other in self.commanding:
-                if self.machine(other)[0] == name and not isinstance(self.action(other), Stop):
-                    now = ((self.busy(other), True), (self.idle(name), False))
-                    then = ((self.busy(other), False), (self.idle(name), True))
-                    yield Case(now, then, f"stops-{other.name}", f"{name} leaves {_words(other)} undone")
+            yield from self._stopped(name, place)
             return
         free = ((self.idle(name), True), (self.busy(place), False))
         taken = ((self.idle(name), False), (self.busy(place), True))
@@ -165,6 +166,21 @@ class Laws:
                 yield Case((*free, (self.clamped(station), True), (self.has(station, _RAW), True)), taken)
             case _:
                 yield Case(free, taken)
+
+    def _stopped(self, name: str, place: Place) -> Iterator[Case]:
+        """Whatever a machine is at ends; then it is at the stop for a while, or idle at once."""
+        idle, now_at = self.idle(name), self.busy(place) if self.lasts(place) else None
+        rest = ((now_at, True), (idle, False)) if now_at is not None else ((idle, True),)
+        yield Case(((idle, True), *([(now_at, False)] if now_at is not None else [])), rest, f"{name}-idle")
+        for other in self.commanding:
+            at = self.busy(other)
+            if self.machine(other)[0] != name or not self.lasts(other):
+                continue
+            if at == now_at:
+                yield Case(((at, True), (idle, False)), tag=f"{name}-stops", says=f"{name} is still to come to rest")
+            else:
+                now = ((at, True), (idle, False), *([(now_at, False)] if now_at is not None else []))
+                yield Case(now, ((at, False), *rest), f"stops-{other.name}", f"{name} leaves {_words(other)} undone")
 
     def refused(self, place: Place) -> Iterator[Case]:
         """The accidents that sending the command of a place can be: each wants that none before it happens."""
@@ -241,10 +257,8 @@ class Laws:
                 fixed = self.clamped(station)
                 yield Case(((fixed, True),), ((fixed, False),))
                 yield Case(((fixed, False),), tag="again")
-            case Work():
+            case Work() | Stop():
                 yield Case()
-            case Stop():
-                return
 
     def spoiled(self, place: Place) -> Iterator[Case]:
         """The accidents that a command can end in."""

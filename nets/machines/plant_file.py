@@ -126,9 +126,14 @@ class Work(_Timed):
 
 
 class Stop(_Model):
-    """Stop whatever the machine does, at once."""
+    """Stop whatever the machine does; at once, or, with `takes_s`, as long as it takes to come to rest.
+
+    What it was at is left undone in the moment in which the machine takes the stop.
+    """
 
     does: Literal["stop"]
+    takes_s: Seconds = 0.0
+    jitter_s: Seconds = 0.0
 
 
 Action = Annotated[
@@ -342,9 +347,6 @@ def _misfits_of_places(model: PlantModel, net: Net) -> Iterator[Diagnostic]:
             message = f"{sent}: '{needed}' is no position of '{command.machine}'"
             hint = f"its positions are {', '.join(known.positions)}"
             yield model.misfit(("machines", command.machine, "positions"), subject, message, hint)
-        if place.completion and isinstance(action, Stop):
-            message = f"'{place.name}' waits for the completion of '{command}', which only stops"
-            yield model.misfit(inner, subject, message, "leave out `until`")
 
 
 def _misfits_of_signals(model: PlantModel, net: Net) -> Iterator[Diagnostic]:

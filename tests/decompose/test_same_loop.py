@@ -61,6 +61,9 @@ def test_the_loop_of_every_cell_of_the_catalogue_is_what_its_plant_file_says(
     assert compare(Plant(net, model, sending, faults), loop) > 1000
 
 
+OTHER_COMMANDS = ({"does": "stop"}, {"does": "stop", "takes_s": 1.0}, {"does": "work", "takes_s": 1.0})
+
+
 def other_plants(model: PlantModel, seed: int) -> PlantModel:
     """The plant with some sensors that flicker or linger, other ways to meet a full station, other commands."""
     draw, data = random.Random(seed), model.model_dump(by_alias=True, exclude_defaults=True)
@@ -74,7 +77,7 @@ def other_plants(model: PlantModel, seed: int) -> PlantModel:
             if action["does"] in {"put", "carry"}:
                 action["when_full"] = draw.choice(["collide", "wait"])
             if draw.random() < 0.1:
-                machine["commands"][name] = draw.choice([{"does": "stop"}, {"does": "work", "takes_s": 1.0}])
+                machine["commands"][name] = draw.choice(OTHER_COMMANDS)
             elif action["does"] != "stop":
                 action["may_fail"] = draw.choice(["repairable", "for_good", None])
     return PlantModel.model_validate(data)

@@ -208,6 +208,47 @@ def test_stop_ends_a_command_without_acknowledgement_and_the_part_stays_on_the_b
     assert bench.plant.stations["table"] is not None
 
 
+STOPPABLE = TEXT.replace("      GRASP:", "      STOP:  {does: stop, takes_s: 0.5}\n      GRASP:") + (
+    "  key:   {acknowledges: R, after_s: 2}\n"
+)
+
+
+def test_stop_that_takes_time_leaves_a_command_undone_at_once_and_is_done_at_rest() -> None:
+    bench = Bench(text=STOPPABLE)
+    bench.give("R", "MOVE", to="ENTRY")
+    bench.wait(1.75)
+    assert bench.give("R", "STOP") == []
+    assert bench.wait(0.25) == []
+    assert bench.give("R", "STOP") == []
+    assert bench.wait(0.25) == []
+    assert bench.wait(0.25) == [CommandDone(3)]
+    assert bench.plant.machines["R"].position == "HOME"
+    assert bench.wait(1.75) == []
+    assert bench.wait(0.25) == [SensorChanged("key", value=True)]
+    assert bench.do("R", "MOVE", to="ENTRY") == [SensorChanged("key", value=False), CommandDone(4)]
+
+
+def test_nobody_comes_to_a_machine_that_is_stopped_at_rest_and_a_machine_that_stops_takes_nothing_else() -> None:
+    bench = Bench(text=STOPPABLE)
+    bench.give("R", "STOP")
+    bench.wait(0.4)
+    assert bench.do("R", "STOP") == [CommandDone(2)]
+    assert bench.wait(100) == []
+    bench.give("R", "STOP")
+    bench.give("R", "MOVE", to="ENTRY")
+    assert bench.faults == ["R: R is given MOVE while it is at STOP"]
+
+
+@pytest.mark.parametrize("text", [STOPPABLE, STOPPABLE.replace("stop, takes_s: 0.5", "stop")])
+def test_stop_that_hangs_leaves_the_command_undone_and_is_never_done(text: str) -> None:
+    bench = Bench(NeverCompletes("R", "STOP"), text=text)
+    bench.give("R", "MOVE", to="ENTRY")
+    assert bench.do("R", "STOP") == []
+    assert bench.plant.machines["R"].position == "HOME"
+    assert [what for _, what in bench.plant.befallen] == ["R has STOP and will never end it"]
+    assert bench.do("R", "STOP") == [CommandDone(3), SensorChanged("key", value=True)]
+
+
 def test_workpiece_that_leaves_unmachined_is_a_fault() -> None:
     bench = Bench(workpieces=1)
     bench.fetch()
@@ -328,7 +369,7 @@ def test_plant_file_that_contradicts_itself_is_refused_with_its_line(
         ("does: stop", "does: stpo", "F1010", "stpo", "did you mean 'stop'? one of 'move', 'grasp'"),
         ("does: stop", "dose: stop", "F1009", "dose", "the key 'does' is missing in 'machines.B.commands.STOP'"),
         ("{does: stop}", "{}", "F1009", "STOP", "add `does:`"),
-        ("does: stop", "does: stop, takes_s: 1", "F1008", "takes_s", "The keys here are does;"),
+        ("does: stop", "does: stop, may_fail: x", "F1008", "may_fail", "The keys here are does, takes_s, jitter_s"),
         ("{does: stop}", "\n      does: stop", "F1010", "STOP", "a mapping, lines of `name: value`"),
         ("plant: bench", "plant: bench\ncolour: red", "F1008", "colour", "unknown key 'colour'"),
         ("firable_plant: 1", "firable_plant: 2", "F1011", "2", "write `firable_plant: 1`"),

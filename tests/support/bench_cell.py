@@ -21,6 +21,7 @@ machines:
       GRASP: {does: grasp, takes_s: 1}
       PUT:   {does: put, takes_s: 1}
       HOLD:  {does: put, takes_s: 1, when_full: wait}
+      HALT:  {does: stop, takes_s: 1}
   M:
     commands:
       CLAMP:   {does: clamp, station: table, takes_s: 1}
@@ -32,6 +33,7 @@ machines:
       RUN:  {does: carry, from: entry, to: table, takes_s: 4}
       WAIT: {does: carry, from: table, to: exit, takes_s: 4, when_full: wait}
       STOP: {does: stop}
+      HALT: {does: stop, takes_s: 1}
 sensors:
   c.entry: {occupied: entry}
   c.hand:  {holding: R}
@@ -42,6 +44,7 @@ COMMANDS = {
     **{f"grasp_{at.lower()}": ("R", "GRASP", (("at", at),)) for at in ("HOME", "ENTRY", "TABLE")},
     **{f"put_{at.lower()}": ("R", "PUT", (("at", at),)) for at in ("HOME", "TABLE", "EXIT")},
     "hold": ("R", "HOLD", (("at", "TABLE"),)),
+    "halt": ("R", "HALT", ()),
     "clamp": ("M", "CLAMP", ()),
     "run": ("M", "RUN", (("program", "O1"),)),
     "unclamp": ("M", "UNCLAMP", ()),
@@ -49,9 +52,16 @@ COMMANDS = {
     "belt": ("B", "RUN", ()),
     "belt_out": ("B", "WAIT", ()),
     "belt_stop": ("B", "STOP", ()),
+    "belt_halt": ("B", "HALT", ()),
 }
-COMPLETIONS = {"grasp_entry": "c.hand", "grasp_table": "c.hand", "to_entry": "c.moved", "run": "c.ended"}
-"""Which commands are waited for: one by its sensor, one with two places, two by acknowledgement alone."""
+COMPLETIONS = {
+    "grasp_entry": "c.hand",
+    "grasp_table": "c.hand",
+    "to_entry": "c.moved",
+    "run": "c.ended",
+    "halt": "c.at_rest",
+}
+"""Which commands are waited for: one by its sensor, one with two places, three by acknowledgement alone."""
 
 
 def bench(extra: str = "") -> PlantModel:
