@@ -20,7 +20,7 @@ from functools import cached_property
 from typing import Any, Final, Generic
 
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
-from firable.analysis.question import Answer, Question, listed, no, yes
+from firable.analysis.question import Answer, Question, listed, no, unknown, yes
 from firable.analysis.spaces.reachability import ReachabilityGraph
 from firable.analysis.spaces.space import S, StateSpace
 from firable.nets.net import Net
@@ -41,6 +41,8 @@ Pair = tuple[str, str]
 
 _RACES_MAX: Final = 1_000_000
 _ONLY_THE_FIRST: Final = f"there are more: only the first {PAIRS_MAX:,} pairs are listed"
+_NONE_OF_THE_FIRST: Final = f"none of the first {PAIRS_MAX:,} pairs that share a place compete, and there are more"
+_ONE_BY_ONE: Final = "ask of two transitions by themselves: --query 'EF (firable(T) and firable(U))'"
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,9 +253,9 @@ def effective_conflict_free(analysis: ConflictAnalysis[Any]) -> Verdict:
     def find() -> Answer:
         space = analysis.space
         if not analysis.met:
-            analysis.require_complete()
-            return yes()
-        hint = ""
+            space.require_complete()
+            return unknown(_NONE_OF_THE_FIRST, _ONE_BY_ONE, "F3004") if analysis.structural.more else yes()
+        hint = _ONLY_THE_FIRST if analysis.structural.more else ""
         if undecided:
             hint = (
                 f"no arbiter names {' and '.join(undecided[0])}: the order of the file decides; add one to `arbiters`"

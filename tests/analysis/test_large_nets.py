@@ -49,7 +49,12 @@ def test_effective_conflicts_stay_unknown_where_not_all_pairs_are_listed_and_non
     net = hub(300)
     unmarked = Net("dry", (Place("hub"), *net.places[1:]), net.transitions)
     report = check(unmarked)
-    assert report.verdict("effective-conflicts").status is Status.UNKNOWN
+    verdict = report.verdict("effective-conflicts")
+    assert (verdict.status, verdict.bound) == (
+        Status.UNKNOWN,
+        "none of the first 20,000 pairs that share a place compete, and there are more",
+    )
+    assert "--query" in verdict.hint
     assert report.figures.effective_conflicts is None
 
 
