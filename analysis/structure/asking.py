@@ -51,7 +51,8 @@ def answer(solver: z3.Solver, deadline: Deadline, assumed: Sequence[z3.BoolRef] 
         stopped = deadline.over
     if found == z3.unknown and not stopped and "interrupted" in solver.reason_unknown():
         raise KeyboardInterrupt
-    return found
+    # Interrupted as it was about to answer, z3 may call it satisfiable and have no model.
+    return z3.unknown if found == z3.sat and stopped else found
 
 
 def _watch(context: z3.Context, deadline: Deadline, done: Event) -> None:

@@ -1,6 +1,7 @@
 """Terms mean what the algebra says, and their SMT-LIB text means the same to another solver."""
 
 import re
+from threading import Event
 
 import pytest
 import z3
@@ -8,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.second_solver import by_cvc5
 
+from firable.analysis.deadline import Deadline
 from firable.analysis.induction.smt import (
     SEED,
     Answer,
@@ -21,6 +23,7 @@ from firable.analysis.induction.smt import (
     value,
     variables,
 )
+from firable.analysis.structure.asking import answer
 from firable.analysis.structure.siphons import minimal_siphons
 from firable.nets.net import Net, Place
 
@@ -142,3 +145,17 @@ def test_every_question_is_asked_with_the_one_seed(monkeypatch: pytest.MonkeyPat
     decide([Terms().true])
     minimal_siphons(Net("n", (Place("p"),)))
     assert [options for options in set_to if options[0] == "random_seed"] == [("random_seed", SEED)] * 2
+
+
+@pytest.mark.parametrize(("found", "told"), [(z3.sat, z3.unknown), (z3.unsat, z3.unsat), (z3.unknown, z3.unknown)])
+def test_a_model_that_comes_as_the_time_is_over_is_no_answer(
+    monkeypatch: pytest.MonkeyPatch, found: z3.CheckSatResult, told: z3.CheckSatResult
+) -> None:
+    cancelled, solver = Event(), z3.Solver()
+
+    def check() -> z3.CheckSatResult:
+        cancelled.set()
+        return found
+
+    monkeypatch.setattr(solver, "check", check)
+    assert answer(solver, Deadline(cancelled=cancelled)) == told
