@@ -12,6 +12,9 @@
 //!   sides with their neighbours, and a ring whose nodes are in such disorder takes four times the time. It is left
 //!   out of nets so long that it would take longer than it saves.
 //!
+//! All of these go by what is next to a place. Where a net is a chain of many parts that are alike, they fold some parts into
+//! each other; the *spectral* order, along the slowest vibration of the net, lays it out as a whole, and slides as well.
+//!
 //! Beside them, a resource and all who may hold it are kept together as one *hub*, and the hubs alone are put in order:
 //! each hub then remembers who holds it in the same way, which matters more than spans, and which no sum of them sees.
 //!
@@ -209,14 +212,17 @@ pub fn candidates(places: usize, transitions: &[Transition], watch: &mut Watch<'
         found.push(both(order));
     }
     watch.tick(BETWEEN)?;
+    let best = found.iter().min_by_key(|pair| span(pair)).map(|pair| &pair[0]);
+    let spectral = best.and_then(|best| graph.spectral(best)).map(|order| both(graph.slide(order)));
+    watch.tick(BETWEEN)?;
     if let Some(hubs) = graph.by_hub(transitions) {
-        // Where the hubs give the shortest arcs, the others are as good as them but for disorder within the hubs.
+        // Where the hubs give the shorter arcs, those are as good as them but for disorder within the hubs.
         if found.iter().all(|pair| span(&hubs) < span(pair)) {
             found.clear();
         }
         found.push(hubs);
     }
-    found.extend(given);
+    found.extend(given.into_iter().chain(spectral));
     found.sort_by_cached_key(span);
     found.dedup();
     Ok(found.into_iter().flatten().collect())

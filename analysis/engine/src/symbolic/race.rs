@@ -5,8 +5,9 @@
 //! computes some results, then the next one, and in the next round twice as many; all are kept for some rounds, which
 //! ends the race on most nets, then half drop out of each, until two are left, of which the second gets less. Which of them
 //! is the first is said once: to change it whenever the other seems to get on better means to pay for both. The order that
-//! the net came in is spared for some rounds beside these, as what its author knew shows in no measure. A
-//! saturation has its own stack and can be left and gone on with, so nothing is done twice, and the race costs some
+//! the net came in is spared for some rounds beside these, as what its author knew shows in no measure. The one with the
+//! shortest arcs, from either end, stays to the end: on a chain of parts every search seems to be nearly done all the
+//! time, and nothing else tells that it is the one that will be. A saturation has its own stack and can be left and gone on with, so nothing is done twice, and the race costs some
 //! times the search of the winner, against a good chance to be a thousand times faster. Where memory becomes short, the
 //! largest search is given up first. The rejected alternative, to go by the levels done alone, drops most winners early.
 //!
@@ -30,24 +31,21 @@ const FUEL_PER_LEVEL: u64 = 16;
 const PATIENCE: u64 = 7;
 /// The rounds for which the order that the net came in, and its reverse, are spared when others drop out.
 const SPARED_ROUNDS: u32 = 2;
-/// The searches that are kept to the end, and how many times less than the first of them the others get.
+/// The searches that run to the end, how many times less than the first of them the second gets, and how many times less
+/// those that stay beside them.
 const FINALISTS: usize = 2;
 const RUNNER_UP: u64 = 4;
+const BESIDE: u64 = 8;
 
 /// Twins differ in their nodes by at most one in so many, after so many rounds.
 const TWINS_APART: usize = 12;
 const ROUNDS_ALIKE: u32 = 2;
 
-/// How long a race is waited for: to its end, or until some would drop out, by when most are over (`standing`).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Patience {
-    Short,
-    Long,
-}
-
 /// A search in one order, which may be left and gone on with.
 struct Racer {
     order: Order,
+    /// Whether no other order has shorter arcs, but for its reverse.
+    is_shortest: bool,
     /// Whether others run for the first places, and this one beside them.
     spared: bool,
     begun: Option<(Ordered, Saturation, Node)>,
@@ -59,7 +57,7 @@ struct Racer {
 
 impl Racer {
     fn new(order: Order) -> Self {
-        Racer { order, spared: false, begun: None, before: 0, alike: 0 }
+        Racer { order, is_shortest: false, spared: false, begun: None, before: 0, alike: 0 }
     }
 
     /// Whether its order is the one that the net came in, from either end.
@@ -109,7 +107,8 @@ impl Racer {
 
 /// Keeps half of the field: in turn who has the fewest rounds to go at the pace of the last one, who has come farthest,
 /// and who has the fewest nodes for it. None of the three alone tells who wins. Of the last two, the first by pace leads,
-/// unless the other has come half as far again. `thinned` counts the times; true where only the last two are left.
+/// unless the other has come half as far again. `thinned` counts the times; true where the last two are left, and who
+/// stays beside them.
 fn thin_out(field: &mut Vec<Racer>, thinned: u32) -> bool {
     let mut spared: Vec<Racer> = field.extract_if(.., |racer| racer.spared).collect();
     if thinned == 1 || field.len() > FINALISTS {
@@ -135,12 +134,17 @@ fn thin_out(field: &mut Vec<Racer>, thinned: u32) -> bool {
             std::mem::swap(first, second);
         }
         let others = std::mem::replace(field, kept).into_iter();
-        spared.extend(others.filter(Racer::is_as_given).map(|racer| Racer { spared: true, ..racer }));
+        let may_stay = |racer: &Racer| racer.is_shortest || racer.is_as_given();
+        spared.extend(others.filter(may_stay).map(|racer| Racer { spared: true, ..racer }));
     }
-    if thinned <= SPARED_ROUNDS {
-        field.append(&mut spared);
-    }
-    field.len() <= FINALISTS && !field.iter().any(|racer| racer.spared)
+    spared.retain(|racer| racer.is_shortest || thinned <= SPARED_ROUNDS);
+    field.append(&mut spared);
+    running(field) <= FINALISTS && field.iter().all(|racer| !racer.spared || racer.is_shortest)
+}
+
+/// How many run for the first places.
+fn running(field: &[Racer]) -> usize {
+    field.iter().filter(|racer| !racer.spared).count()
 }
 
 /// Whether two searches, both begun, stand at the same level with about as many nodes.
@@ -162,60 +166,97 @@ fn drop_twins(field: &mut Vec<Racer>) {
     }
 }
 
-impl Symbolic {
-    /// The reachable markings in the order that finds them first; None where patience ended before.
-    pub(super) fn raced(
+/// The searches for the markings of one net, each in an order of its own.
+pub(super) struct Race {
+    transitions: Vec<Transition>,
+    initial: Vec<u32>,
+    field: Vec<Racer>,
+    /// The results that a search may compute in the next round, and in the first one.
+    fuel: u64,
+    first: u64,
+    /// Those that a search had in all rounds.
+    spent: u64,
+    /// How often some dropped out, and whether only those who stay to the end are left.
+    thinned: u32,
+    settled: bool,
+}
+
+impl Race {
+    /// The race before its first round; `orders` replaces the candidates of `order`.
+    pub(super) fn new(
         places: usize,
         (transitions, initial): (Vec<Transition>, Vec<u32>),
-        bytes: usize,
         orders: Option<Vec<Order>>,
-        patience: Patience,
         watch: &mut Watch<'_>,
-    ) -> Result<Option<Self>, Stop> {
+    ) -> Result<Self, Stop> {
         let orders = match orders {
             Some(orders) => orders,
             None => candidates(places, &transitions, watch)?,
         };
         let mut field: Vec<Racer> = orders.into_iter().map(Racer::new).collect();
-        let first = FUEL + FUEL_PER_LEVEL * places as u64;
-        let (mut fuel, mut spent, mut thinned, mut settled) = (first, 0, 0, false);
-        while !field.is_empty() {
-            let mut at = 0;
-            while at < field.len() {
-                let others: usize = field.iter().map(Racer::bytes).sum::<usize>() - field[at].bytes();
-                let last_two = field.iter().filter(|racer| !racer.spared).count() <= FINALISTS;
-                let share = if at > 0 && last_two && !field[at].spared { fuel / RUNNER_UP } else { fuel };
-                match field[at].run(&transitions, &initial, bytes.saturating_sub(others), share, watch) {
-                    Ok(Some(reach)) => {
-                        if let Some(begun) = field.swap_remove(at).begun {
-                            drop(field);
-                            return Ok(Some(Self::found(begun, transitions, initial, reach, bytes)));
-                        }
-                    }
-                    Ok(None) => at += 1,
-                    Err(Stop::Memory) => {
-                        // It stopped within a step. If another one is larger, that gives way and this begins again.
-                        let largest = (0..field.len()).max_by_key(|&other| field[other].bytes()).unwrap_or(at);
-                        field[at].begun = None;
-                        field.remove(largest);
-                        at -= usize::from(largest < at);
-                    }
-                    Err(stop) => return Err(stop),
-                }
-            }
-            spent += fuel;
-            drop_twins(&mut field);
-            if spent >= PATIENCE * first && patience == Patience::Short {
-                return Ok(None);
-            }
-            if spent >= PATIENCE * first && !settled {
-                thinned += 1;
-                settled = thin_out(&mut field, thinned);
-            }
-            field.iter_mut().for_each(|racer| racer.before = racer.standing().0);
-            fuel *= 2;
+        for at in 0..field.len() {
+            field[at].is_shortest = at == 0 || field[at].is_reverse_of(&field[0]);
         }
-        Err(Stop::Memory)
+        let first = FUEL + FUEL_PER_LEVEL * places as u64;
+        Ok(Race { transitions, initial, field, fuel: first, first, spent: 0, thinned: 0, settled: false })
+    }
+
+    /// Whether some drop out by now: most races are over before.
+    pub(super) fn is_long(&self) -> bool {
+        self.spent >= PATIENCE * self.first
+    }
+
+    /// Goes on for a round; the markings, if a search has ended in it. Out of memory where none is left.
+    pub(super) fn round(&mut self, bytes: usize, watch: &mut Watch<'_>) -> Result<Option<Symbolic>, Stop> {
+        let mut at = 0;
+        while at < self.field.len() {
+            let others = self.field.iter().map(Racer::bytes).sum::<usize>() - self.field[at].bytes();
+            let share = match self.field[at].spared {
+                true if self.settled => self.fuel / BESIDE,
+                false if at > 0 && running(&self.field) <= FINALISTS => self.fuel / RUNNER_UP,
+                _ => self.fuel,
+            };
+            let room = bytes.saturating_sub(others);
+            match self.field[at].run(&self.transitions, &self.initial, room, share, watch) {
+                Ok(Some(reach)) => {
+                    if let Some(begun) = self.field.swap_remove(at).begun {
+                        self.field.clear();
+                        let net = (std::mem::take(&mut self.transitions), std::mem::take(&mut self.initial));
+                        return Ok(Some(Symbolic::found(begun, net.0, net.1, reach, bytes)));
+                    }
+                }
+                Ok(None) => at += 1,
+                Err(Stop::Memory) => {
+                    // It stopped within a step. If another one is larger, that gives way and this begins again.
+                    let largest = (0..self.field.len()).max_by_key(|&other| self.field[other].bytes()).unwrap_or(at);
+                    self.field[at].begun = None;
+                    self.field.remove(largest);
+                    at -= usize::from(largest < at);
+                }
+                Err(stop) => return Err(stop),
+            }
+        }
+        if self.field.is_empty() {
+            return Err(Stop::Memory);
+        }
+        self.spent += self.fuel;
+        drop_twins(&mut self.field);
+        if self.is_long() && !self.settled {
+            self.thinned += 1;
+            self.settled = thin_out(&mut self.field, self.thinned);
+        }
+        self.field.iter_mut().for_each(|racer| racer.before = racer.standing().0);
+        self.fuel *= 2;
+        Ok(None)
+    }
+
+    /// Goes on to the end.
+    pub(super) fn run(mut self, bytes: usize, watch: &mut Watch<'_>) -> Result<Symbolic, Stop> {
+        loop {
+            if let Some(found) = self.round(bytes, watch)? {
+                return Ok(found);
+            }
+        }
     }
 }
 
@@ -329,14 +370,29 @@ mod tests {
     }
 
     #[test]
-    fn who_has_little_patience_leaves_a_long_race_and_sees_the_end_of_a_short_one() {
+    fn a_race_is_long_when_some_drop_out_and_most_are_over_before() {
         for (count, zones, ends) in [(2, 4, true), (8, 24, false)] {
             let (places, transitions, initial) = vehicles(count, zones);
-            let (net, mut poll) = ((transitions, initial), unwatched);
+            let mut poll = unwatched;
             let watch = &mut Watch::new(None, &mut poll);
-            let found = Symbolic::raced(places, net, 1 << 30, None, Patience::Short, watch).expect("enough room");
+            let mut race = Race::new(places, (transitions, initial), None, watch).expect("enough room");
+            let (all, mut found) = (race.field.len(), None);
+            while found.is_none() && !race.is_long() {
+                assert_eq!(race.thinned, 0);
+                found = race.round(1 << 30, watch).expect("enough room");
+            }
             assert_eq!(found.is_some(), ends);
+            assert_eq!((race.thinned, race.field.len() < all), (u32::from(!ends), true));
         }
+    }
+
+    #[test]
+    fn a_race_of_which_no_search_has_room_is_out_of_memory() {
+        let (places, transitions, initial) = vehicles(8, 24);
+        let mut poll = unwatched;
+        let watch = &mut Watch::new(None, &mut poll);
+        let race = Race::new(places, (transitions, initial), None, watch).expect("enough room");
+        assert_eq!(race.run(1 << 16, watch).map(|_| ()), Err(Stop::Memory));
     }
 
     #[test]
@@ -344,5 +400,24 @@ mod tests {
         let (mut racers, _) = field(&orders());
         (0..4).for_each(|_| drop_twins(&mut racers));
         assert_eq!(racers.len(), 4);
+    }
+
+    #[test]
+    fn the_order_with_the_shortest_arcs_stays_to_the_end_with_its_reverse_beside_the_last_two() {
+        let (places, transitions, initial) = vehicles(6, 24);
+        let other: Order = (0..places as u32).map(|at| at * 11 % places as u32).collect();
+        let (across, along): (Order, Order) =
+            ((0..places as u32).map(|at| at * 5 % places as u32).collect(), (0..places as u32).collect());
+        let back = |order: &Order| order.iter().rev().copied().collect::<Order>();
+        let all = vec![across.clone(), back(&across), other.clone(), back(&other), along.clone(), back(&along)];
+        let mut poll = unwatched;
+        let watch = &mut Watch::new(None, &mut poll);
+        let mut race = Race::new(places, (transitions, initial), Some(all), watch).expect("enough room");
+        while !race.settled {
+            assert!(race.round(1 << 30, watch).expect("enough room").is_none(), "the race is over too soon");
+        }
+        let stays: Vec<&Order> = race.field.iter().map(|racer| &racer.order).collect();
+        assert!([&across, &back(&across)].iter().all(|order| stays.contains(order)), "{}", stays.len());
+        assert!((2..=4).contains(&stays.len()) && running(&race.field) <= FINALISTS);
     }
 }

@@ -12,7 +12,7 @@
 use super::merging::{Merged, merged};
 use super::order::Order;
 use super::ordered::{Events, Ordered};
-use super::race::Patience;
+use super::race::Race;
 use super::space::Symbolic;
 use super::trial::meets_contact;
 use super::zdd::{EMPTY, Node, Store, UNIT};
@@ -66,22 +66,25 @@ impl Symbolic {
         orders: Option<Vec<Order>>,
         watch: &mut Watch<'_>,
     ) -> Result<Self, Stop> {
-        if orders.is_none()
-            && let Some(smaller) = merged(places, &transitions, &initial, watch)?
-        {
-            let net = (transitions.clone(), initial.clone());
-            match Self::raced(places, net, bytes, None, Patience::Short, watch) {
+        let smaller = if orders.is_none() { merged(places, &transitions, &initial, watch)? } else { None };
+        let net = (transitions.clone(), initial.clone());
+        let mut race = Race::new(places, net, orders, watch)?;
+        let Some(smaller) = smaller else { return race.run(bytes, watch) };
+        while !race.is_long() {
+            match race.round(bytes, watch) {
                 Ok(Some(found)) => return Ok(found),
-                Ok(None) | Err(Stop::Memory) => {}
-                Err(stop) => return Err(stop),
-            }
-            match Self::through(smaller, &transitions, &initial, bytes, watch) {
-                Ok(Some(found)) => return Ok(found),
-                Ok(None) | Err(Stop::Memory) => {}
+                Ok(None) => {}
+                Err(Stop::Memory) => break,
                 Err(stop) => return Err(stop),
             }
         }
-        Self::raced(places, (transitions, initial), bytes, orders, Patience::Long, watch)?.ok_or(Stop::Memory)
+        drop(race);
+        match Self::through(smaller, &transitions, &initial, bytes, watch) {
+            Ok(Some(found)) => return Ok(found),
+            Ok(None) | Err(Stop::Memory) => {}
+            Err(stop) => return Err(stop),
+        }
+        Race::new(places, (transitions, initial), None, watch)?.run(bytes, watch)
     }
 
     /// The same by way of the smaller net alone; None where there is none, or it does not stand for the net.
@@ -110,8 +113,7 @@ impl Symbolic {
             return Ok(None);
         }
         let Merged { transitions: its, initial: begin, stands } = smaller;
-        let found = Self::raced(stands.len(), (its, begin), bytes, None, Patience::Long, watch)?;
-        let mut small = found.ok_or(Stop::Memory)?;
+        let mut small = Race::new(stands.len(), (its, begin), None, watch)?.run(bytes, watch)?;
         let reach = small.reach;
         if small.all(&[], reach, Events::Contacts, watch)? != EMPTY {
             return Ok(None);
