@@ -40,7 +40,7 @@ const LAYERS_WORK_LEAST: u64 = 250_000;
 const IN_VAIN: u64 = 8;
 /// The firings that are drawn at random, all together, and how many deadlocks that are no targets they may end in.
 const DRAWN_MAX: u64 = 1 << 22;
-const OTHERS_MAX: u64 = 1 << 8;
+const OTHERS_MAX: u64 = 1 << 6;
 /// A sequence that was drawn is taken as it is if it has at most so many times the firings that are needed at least.
 const HARDLY_LONGER: usize = 2;
 /// The part of the memory that the masks of the net may take for them.
