@@ -17,7 +17,7 @@ from typing import Final
 
 import click
 import pytest
-from support.sessions import fits, run, session
+from support.sessions import fits, run_here, session
 
 from firable.cli.main import firable
 
@@ -32,7 +32,10 @@ def _with(kind: str) -> list[str]:
 
 
 @pytest.mark.parametrize("name", _with("console"))
-def test_every_command_of_a_page_prints_what_it_shows(name: str, tmp_path: Path) -> None:
+def test_every_command_of_a_page_prints_what_it_shows(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "120")
     text, status, end = (DOCS / name).read_text("utf-8"), 0, 0
     for block in BLOCK.finditer(text):
         between, end = text[end : block.start()], block.end()
@@ -41,7 +44,7 @@ def test_every_command_of_a_page_prints_what_it_shows(name: str, tmp_path: Path)
                 (tmp_path / file).write_text(block["text"], "utf-8")
             continue
         for command, shown in session(block["text"]):
-            done = run(command, tmp_path, status)
+            done = run_here(command, tmp_path, status)
             status = done.returncode
             assert fits(shown, done.stdout), f"$ {command}\n{done.stdout}"
     for picture in re.findall(r"\]\(pictures/([\w.]+)\)", text):

@@ -1,14 +1,11 @@
 """Every code has a page, and what is said of it is known word for word: by the page's example, or by `EXACT`."""
 
-import contextlib
-import io
 import re
-import shlex
 from pathlib import Path
 
 import pytest
 from support.exact_words import EXACT
-from support.sessions import fits, run, session
+from support.sessions import fits, run_here, session
 
 from firable.cli.main import main
 from firable.nets.diagnostics import CODES
@@ -39,15 +36,6 @@ def test_a_page_begins_with_the_code_and_its_title(code: str) -> None:
     assert all(len(line) <= 120 for line in BLOCK.sub("", text).splitlines())
 
 
-def printed(command: str, folder: Path) -> str:
-    if not command.startswith("firable "):
-        return run(command, folder).stdout
-    told = io.StringIO()
-    with contextlib.redirect_stdout(told), contextlib.redirect_stderr(told):
-        main(shlex.split(command)[1:])
-    return told.getvalue()
-
-
 @pytest.mark.parametrize("code", WITH_EXAMPLE)
 def test_what_a_page_shows_is_printed(code: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
@@ -59,7 +47,7 @@ def test_what_a_page_shows_is_printed(code: str, tmp_path: Path, monkeypatch: py
                 (tmp_path / block["file"]).write_text(block["text"], "utf-8")
             continue
         for command, shown in session(block["text"]):
-            told = printed(command, tmp_path)
+            told = run_here(command, tmp_path).stdout
             assert fits(shown, told), f"$ {command}\n{told}"
             commands += 1
     assert commands
