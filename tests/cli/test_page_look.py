@@ -11,7 +11,8 @@ from support.browser import browser, needs_browser, page_at
 
 from firable.cli.main import main
 
-CELLS = ["one_robot", "two_cells"]
+CELLS = {"one_robot": (), "two_cells": ("--faults", "--wrong")}
+"""The cells, and what is asked of the protocol of each: of the wide one for every section, of the other for none."""
 WINDOW = "[document.documentElement.scrollWidth, document.documentElement.clientWidth]"
 CUT_OFF = """() => [...document.querySelectorAll('nav a')].map(link => link.getBoundingClientRect())
     .filter(box => box.left < 0 || box.right > innerWidth).length"""
@@ -25,11 +26,11 @@ def chromium() -> Iterator[Browser]:
 
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """The page of each cell with every section that the protocol has."""
+    """The page of each cell."""
     found = {}
-    for name in CELLS:
+    for name, asked in CELLS.items():
         page = tmp_path_factory.mktemp("look") / f"{name}.html"
-        assert main(["prove", f"catalogue:{name}", "--faults", "--wrong", "--report", str(page)]) == 0
+        assert main(["prove", f"catalogue:{name}", *asked, "--report", str(page)]) == 0
         found[name] = Path(page).as_uri()
     return found
 
