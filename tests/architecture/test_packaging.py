@@ -34,6 +34,11 @@ def run(*command: str | Path, code: int = 0, cwd: Path | None = None, also: dict
     return done.stdout + done.stderr
 
 
+def pip(programs: Path, *command: str | Path) -> str:
+    """What the installer of these tests says, of the environment with these programs."""
+    return run(sys.executable, "-m", "pip", "--python", programs / "python", "--disable-pip-version-check", *command)
+
+
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The wheel that `python -m build` makes, which is built from the sdist that it makes first."""
@@ -47,8 +52,8 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def thin(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The programs of a fresh environment with the wheel and its base dependencies, without the extra `prove`."""
     folder = tmp_path_factory.mktemp("thin")
-    venv.create(folder, with_pip=True)
-    run(folder / "bin" / "python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel)
+    venv.create(folder)  # without an installer, which would first have to be installed
+    pip(folder / "bin", "install", "--quiet", wheel)
     return folder / "bin"
 
 
@@ -70,7 +75,7 @@ def test_the_wheel_holds_every_module_and_every_data_file(wheel: Path) -> None:
 
 
 def test_the_executor_and_the_help_need_no_solver(thin: Path, tmp_path: Path) -> None:
-    installed = run(thin / "python", "-m", "pip", "list", "--disable-pip-version-check").lower()
+    installed = pip(thin, "list").lower()
     assert not any(solver in installed for solver in ("z3", "networkx", "numpy", "highspy"))
     assert "Usage: firable" in run(thin / "firable", "--help", cwd=tmp_path)
     modules = executor_modules()
