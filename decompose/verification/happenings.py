@@ -88,13 +88,14 @@ class Plant(Things):
 
     def fires(self, t: Transition, state: State) -> Iterator[Changes]:
         """Eq. (1)-(4), gates as the signals show them, once the commands of what it takes or reads have been sent."""
+        if not all(state[f"token of {p}"] for p in (*t.inputs, *t.permissive)):
+            return
+        if any(state[f"token of {p}"] for p in (*t.outputs, *t.inhibitive)):
+            return
         due = [f"unsent {p}" for p in (*t.inputs, *t.permissive, *t.outputs) if f"unsent {p}" in self.things]
-        full = all(state[f"token of {p}"] for p in (*t.inputs, *t.permissive))
-        empty = not any(state[f"token of {p}"] for p in (*t.outputs, *t.inhibitive))
         timers = {place.within.timer for place in self.net.places if place.within is not None}
         read = [gate for gate in t.external if gate.signal not in timers or gate.signal in self.timers]
-        may = full and empty and not any(state[one] for one in due)
-        if may and all(self.shown(gate.signal, state) == gate.wanted for gate in read):
+        if not any(state[one] for one in due) and all(self.shown(gate.signal, state) == gate.wanted for gate in read):
             changes: Changes = {f"token of {p}": False for p in t.inputs}
             changes |= {f"token of {p}": True for p in t.outputs}
             if self.sending is Sending.LATE:

@@ -9,10 +9,9 @@ Nothing is explored, so the size of the loop does not matter; what one happening
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import product
 from math import prod
-from typing import Final
+from typing import Final, NamedTuple
 
 from firable.decompose.verification.happenings import Plant
 from firable.decompose.verification.plant import ACCIDENT, OVERRUN, DiffersError, Value
@@ -76,22 +75,11 @@ class _UnseenError(Exception):
     """The second reading looks at a thing that the net does not."""
 
 
-@dataclass(frozen=True)
-class _State(Mapping[str, Value]):
+class _State(dict[str, Value]):
     """The values of some things; looking at another one is told."""
 
-    known: Mapping[str, Value]
-
-    def __getitem__(self, thing: str) -> Value:
-        if thing not in self.known:
-            raise _UnseenError(thing)
-        return self.known[thing]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.known)
-
-    def __len__(self) -> int:
-        return len(self.known)
+    def __missing__(self, thing: str) -> Value:
+        raise _UnseenError(thing)
 
 
 def compare_one(plant: Plant, name: str, transitions: Sequence[Transition]) -> int:
@@ -102,31 +90,43 @@ def compare_one(plant: Plant, name: str, transitions: Sequence[Transition]) -> i
             raise DiffersError(f"'{t.name}' may happen after an accident")
     touched = (place for t in transitions for place in (*t.inputs, *t.outputs, *t.permissive, *t.inhibitive))
     things = dict.fromkeys(plant.thing_of[place] for place in touched) | dict.fromkeys((ACCIDENT, OVERRUN))
+    ways = [_Way.of(t) for t in transitions]
     while True:
         try:
-            return sum(_same_in(plant, name, transitions, state) for state in _states(plant, things, name))
+            return sum(_same_in(plant, name, ways, state) for state in _states(plant, things, name))
         except _UnseenError as error:
             things[str(error)] = None
 
 
-def _states(plant: Plant, things: Iterable[str], name: str) -> Iterator[dict[str, Value]]:
+class _Way(NamedTuple):
+    """The places of a transition: those that must be full, those that must be empty, and what it takes and fills."""
+
+    full: frozenset[str]
+    empty: frozenset[str]
+    takes: frozenset[str]
+    fills: frozenset[str]
+
+    @classmethod
+    def of(cls, t: Transition) -> _Way:
+        takes, fills = frozenset(t.inputs), frozenset(t.outputs)
+        return cls(takes.union(t.permissive), fills.union(t.inhibitive), takes, fills)
+
+
+def _states(plant: Plant, things: Iterable[str], name: str) -> Iterator[_State]:
     """Every state of these things before an accident."""
     among: dict[str, list[Value]] = {
         thing: [False] if thing in {ACCIDENT, OVERRUN} else plant.values(thing) for thing in things
     }
     if prod(map(len, among.values())) > STATES_MAX:
         raise DiffersError(f"'{name}' looks at more things than are compared")
-    yield from (dict(zip(among, values, strict=True)) for values in product(*among.values()))
+    yield from (_State(zip(among, values, strict=True)) for values in product(*among.values()))
 
 
-def _same_in(plant: Plant, name: str, transitions: Iterable[Transition], state: dict[str, Value]) -> bool:
-    said = {_marked(plant, {**state, **_known(changes, state)}) for changes in plant.happenings[name](_State(state))}
+def _same_in(plant: Plant, name: str, ways: Iterable[_Way], state: _State) -> bool:
+    said = {_marked(plant, {**state, **_known(changes, state)}) for changes in plant.happenings[name](state)}
     marked = _marked(plant, state)
-    done = set()
-    for t in transitions:
-        if marked.issuperset((*t.inputs, *t.permissive)) and marked.isdisjoint((*t.outputs, *t.inhibitive)):
-            done.add(marked.difference(t.inputs).union(t.outputs))
-    if said != done:
+    firable = (way for way in ways if way.full <= marked and way.empty.isdisjoint(marked))
+    if said != {marked - way.takes | way.fills for way in firable}:
         told = ", ".join(f"{thing}: {value}" for thing, value in state.items() if value)
         raise DiffersError(f"'{name}' does not go as the plant file says, where {told or 'nothing is so'}")
     return True
@@ -140,5 +140,5 @@ def _known(changes: dict[str, Value], state: dict[str, Value]) -> dict[str, Valu
 
 def _marked(plant: Plant, state: Mapping[str, Value]) -> frozenset[str]:
     """The places that are marked in a state."""
-    places = ((plant.things[thing], value) for thing, value in state.items())
-    return frozenset(places_of[value] for places_of, value in places if value in places_of)
+    things = plant.things
+    return frozenset([things[thing][value] for thing, value in state.items() if value in things[thing]])
