@@ -209,6 +209,13 @@ class ReachabilityGraph(Derived["Column"]):
         found[self.engine.deadlocks()] = True
         return found
 
+    def alone(self, marking: Marking) -> Column:
+        """The set of one marking; the empty set for one that was not found."""
+        found = self.none()
+        if (index := self.index_of(marking)) is not None:
+            found[index] = True
+        return found
+
     def contains(self, markings: Column, marking: Marking) -> bool:
         """Whether a marking is in a set; False for one that was not found."""
         index = self.index_of(marking)

@@ -119,6 +119,10 @@ class StateSpace(Protocol[S]):
         """The markings in which a Boolean term holds; `term` gets the algebra and the reader of places."""
         ...
 
+    def alone(self, marking: Marking) -> S:
+        """The set of one marking; the empty set for one that was not found."""
+        ...
+
     def contains(self, markings: S, marking: Marking) -> bool:
         """Whether a marking is in a set; False for one that was not found."""
         ...

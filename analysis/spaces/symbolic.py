@@ -163,6 +163,12 @@ class SymbolicSpace(Derived[MarkingSet]):
                 return self.algebra.disjunction(map(self.satisfying, operands))
         return self.where(lambda algebra, holds: evaluate(algebra, self.net, formula, holds))
 
+    def alone(self, marking: Marking) -> MarkingSet:
+        """The set of one marking; the empty set for one that is not reachable."""
+        places = range(len(self.net.places))
+        full, empty = [p for p in places if marking >> p & 1], [p for p in places if not marking >> p & 1]
+        return self.engine.having(self.reach, full, empty)
+
     def contains(self, markings: MarkingSet, marking: Marking) -> bool:
         """Whether a marking is in a set; False for one that is not reachable."""
         return markings.contains([i for i in range(len(self.net.places)) if marking >> i & 1])

@@ -149,15 +149,17 @@ class Walk(Generic[S]):
 
     def go(self, goal: Pairs[S], within: Pairs[S]) -> bool:
         """Go on to the nearest pair of the goal through these pairs; whether there is a way."""
-        layers, size = [goal], -1
+        layers, sizes = [goal], dict[int, int]()
         sets = self.product.sets
-        while not self._in(layers[-1]):
-            now = sum(map(sets.space.count, layers[-1].values()))
-            if now == size:
+        steps = Steps(self.product, {})
+        while not self._in(last := layers[-1]):
+            now = {state: sets.space.count(markings) for state, markings in last.items()}
+            if now == sizes:
                 return False
-            size = now
-            last = layers[-1]
-            steps = Steps(self.product, last)
+            for state in now:
+                if now[state] != sizes.get(state):
+                    steps.grow(state, last[state])
+            sizes = now
             layers.append(
                 {
                     state: sets.either(
@@ -219,6 +221,6 @@ def accepted_run(product: Product[S], fair: Pairs[S], leading: Pairs[S]) -> Run:
             if not walk.go({q: sets.both(of, steps.into(product.edges[q], mark)) for q, of in inside.items()}, inside):
                 raise WitnessError("a mark of the automaton is not met again")
             walk.step(inside, mark)
-        home = {anchor[1]: sets.both(sets.of_marking(anchor[0]), inside[anchor[1]])}
+        home = {anchor[1]: sets.both(sets.space.alone(anchor[0]), inside[anchor[1]])}
         if walk.go(home, inside):
             return Run(tuple(walk.fired[:begin]), tuple(walk.fired[begin:]))

@@ -75,12 +75,3 @@ class Sets(Generic[S]):
         """EG: some maximal run stays within the set."""
         stuck = self.both(self.space.deadlocks, within)
         return self.either(self.space.endless(within), self.until(within, stuck))
-
-    def of_marking(self, marking: int) -> S:
-        """The set of one marking."""
-        places = range(len(self.space.net.places))
-        return self.space.where(
-            lambda algebra, holds: algebra.conjunction(
-                holds(place) if marking >> place & 1 else algebra.negation(holds(place)) for place in places
-            )
-        )

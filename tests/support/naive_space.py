@@ -98,6 +98,10 @@ class NaiveSpace(Derived[Markings]):
         """The markings in contact at a transition."""
         return self.where(lambda algebra, holds: in_contact(algebra, self.net, t, holds))
 
+    def alone(self, marking: Marking) -> Markings:
+        """The set of one marking, if it is reachable."""
+        return frozenset({marking}) & frozenset(self.graph)
+
     def contains(self, markings: Markings, marking: Marking) -> bool:
         """Whether the marking is one of these."""
         return marking in markings
