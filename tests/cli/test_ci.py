@@ -238,6 +238,12 @@ def test_the_pre_commit_hook_is_one_and_brings_what_checking_needs() -> None:
     assert hook["entry"] == "firable check"
 
 
+@pytest.fixture(autouse=True)
+def no_other_plugins(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The plugins that are installed here beside ours take longer to load than these nets to check."""
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+
+
 def outcomes(pytester: pytest.Pytester, *arguments: str) -> tuple[dict[str, int], str]:
     done = pytester.runpytest_subprocess(*PLUGIN, *arguments)
     told = done.stdout.str() + done.stderr.str()
@@ -257,7 +263,7 @@ def test_each_verdict_that_matters_is_a_test(pytester: pytest.Pytester) -> None:
     assert found == {"failed": 1, "deselected": 8}
 
 
-@pytest.mark.parametrize("workers", [(), ("-n", "1")])
+@pytest.mark.parametrize("workers", [(), ("-p", "xdist", "-n", "1")])
 def test_the_story_of_a_verdict_is_told_once_also_in_ci(
     pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, workers: tuple[str, ...]
 ) -> None:
