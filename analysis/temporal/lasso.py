@@ -149,17 +149,16 @@ class Walk(Generic[S]):
 
     def go(self, goal: Pairs[S], within: Pairs[S]) -> bool:
         """Go on to the nearest pair of the goal through these pairs; whether there is a way."""
-        layers, sizes = [goal], dict[int, int]()
+        layers, sizes, earlier = [goal], dict[int, int](), Pairs[S]()
         sets = self.product.sets
-        steps = Steps(self.product, {})
         while not self._in(last := layers[-1]):
             now = {state: sets.space.count(markings) for state, markings in last.items()}
             if now == sizes:
                 return False
-            for state in now:
-                if now[state] != sizes.get(state):
-                    steps.grow(state, last[state])
-            sizes = now
+            grown = [state for state in now if now[state] > sizes.get(state, 0)]
+            # What leads into the rest is there already, and to go back from a few markings is quick.
+            steps = Steps(self.product, {q: sets.both(last[q], sets.outside(earlier.get(q, sets.none))) for q in grown})
+            sizes, earlier = now, last
             layers.append(
                 {
                     state: sets.either(

@@ -161,14 +161,6 @@ class Steps(Generic[S]):
         for key in [key for key in self._before if key[0] == state]:
             del self._before[key]
 
-    def grow(self, state: int, markings: S) -> None:
-        """Let the state be paired with these markings, among which are all that it is paired with."""
-        sets = self.product.sets
-        fresh = sets.both(markings, sets.outside(self.pairs.get(state, sets.none)))
-        self.pairs[state] = markings
-        for key in [key for key in self._before if key[0] == state]:
-            self._before[key] = sets.either(self._before[key], sets.before(fresh, key[1]))
-
     def into(self, edges: Iterable[ProductEdge[S]], mark: int | None = None) -> S:
         """The markings from which one of the edges (with the mark, if it is given) leads into the pairs.
 
