@@ -12,6 +12,7 @@ arguments or more, and a `define-fun` for each shared subterm.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -226,13 +227,15 @@ def values_of(term: Term, assignment: Mapping[str, bool]) -> dict[Term, bool]:
 
 _INLINE_DEPTH_MAX: Final = 24  # a deeper subterm is cut out by a definition: parsers of other solvers may recurse
 _LINE_MAX: Final = 110
+_NOT_QUOTED: Final = re.compile(r"[^ -~]|[|\\%]")
+"""What may not stand between bars, and `%`, which marks it."""
 
 
 def symbol(name: str) -> str:
     """A name as a quoted symbol.
 
-    >>> symbol("robot.free"), symbol("a|b"), symbol("é")
-    ('|robot.free|', '|a%7c.b|', '|%e9.|')
+    >>> symbol("robot.free"), symbol("a|b"), symbol("é"), symbol("50%"), symbol(chr(92))
+    ('|robot.free|', '|a%7c.b|', '|%e9.|', '|50%25.|', '|%5c.|')
     """
     return f"|{in_ascii(name)}|"
 
@@ -240,7 +243,7 @@ def symbol(name: str) -> str:
 def in_ascii(name: str) -> str:
     """A name with what may not stand between bars as `%`, its number in hexadecimal digits, and a point."""
     # `%` is written so itself, and the point says where the number ends: no two names become one symbol.
-    return "".join(c if " " <= c <= "~" and c not in "|\\%" else f"%{ord(c):x}." for c in name)
+    return _NOT_QUOTED.sub(lambda found: f"%{ord(found[0]):x}.", name)
 
 
 def smtlib_term(term: Term) -> str:
