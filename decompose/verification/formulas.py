@@ -9,6 +9,7 @@ worth `true`, and it is not the worth but the sentence that has to be the right 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from typing import Final
 
@@ -17,14 +18,16 @@ Formula = int
 TRUE: Final[Formula] = 0
 FALSE: Final[Formula] = 1
 
+_BY_NUMBER: Final = re.compile(r"[^ -~]|[|\\%]")
+
 
 def spelled(name: str) -> str:
     """A name as a file spells it: what is not printable ASCII, a bar, a backslash or `%` by its number.
 
-    >>> spelled("robot.free"), spelled("é")
-    ('robot.free', '%e9.')
+    >>> spelled("robot.free"), spelled("é"), spelled("50%"), spelled("|"), spelled(chr(92))
+    ('robot.free', '%e9.', '50%25.', '%7c.', '%5c.')
     """
-    return "".join(c if " " <= c <= "~" and c not in "|\\%" else f"%{ord(c):x}." for c in name)
+    return _BY_NUMBER.sub(lambda found: f"%{ord(found[0]):x}.", name)
 
 
 class Formulas:
