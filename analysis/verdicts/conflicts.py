@@ -42,7 +42,7 @@ Pair = tuple[str, str]
 _RACES_MAX: Final = 1_000_000
 _ONLY_THE_FIRST: Final = f"there are more: only the first {PAIRS_MAX:,} pairs are listed"
 _NONE_OF_THE_FIRST: Final = f"none of the first {PAIRS_MAX:,} pairs that share a place compete, and there are more"
-_ONE_BY_ONE: Final = "ask of two transitions by themselves: --query 'EF (firable(T) and firable(U))'"
+_ONE_BY_ONE: Final = "ask of two that no signal keeps apart: --query 'EF (firable(T) and firable(U))'"
 
 
 @dataclass(frozen=True, slots=True)

@@ -157,7 +157,9 @@ class Plant(Things):
     def done(self, place: Place, state: State) -> Iterator[Changes]:
         """A machine is done with what it is at: the effect, what sensors see of it, and the completion."""
         name = self.machine_of(place)
-        if state[f"at {name}"] != place.name or self.has_failed(name, state):
+        if state[f"at {name}"] != place.name:
+            return
+        if self.has_failed(name, state) and not isinstance(self.action(place), Stop):
             return
         for effect in self.effect(place, state):
             for seen in self.sensors_see(effect, state):
@@ -205,7 +207,7 @@ class Plant(Things):
             yield {f"at {name}": None, ACCIDENT: True}
 
     def has_failed(self, machine: str, state: State) -> bool:
-        """Whether a machine has failed: nothing that it is at gets done then."""
+        """Whether a machine has failed: nothing that it is at gets done then, but a stop."""
         return machine in self.may_fail and bool(state[f"failed {machine}"])
 
     def fails(self, place: Place, state: State) -> Iterator[Changes]:

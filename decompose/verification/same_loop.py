@@ -76,7 +76,7 @@ class _UnseenError(Exception):
 
 
 class _State(dict[str, Value]):
-    """The values of some things; looking at another one is told."""
+    """The values of some things; looking at another one, by its name in brackets, is told."""
 
     def __missing__(self, thing: str) -> Value:
         raise _UnseenError(thing)

@@ -257,7 +257,9 @@ class _Closing:
                 continue
             name, _ = self.laws.machine(place)
             busy, idle = self.laws.busy(place), self.laws.idle(name)
-            working = ((busy, True), (idle, False), *(((self.failed[name], False),) if name in self.failed else ()))
+            # A machine that has failed at a command still obeys a stop.
+            may_hang = name in self.failed and not isinstance(self.laws.action(place), Stop)
+            working = ((busy, True), (idle, False), *(((self.failed[name], False),) if may_hang else ()))
             at_work = each(start, [Case(working, ((busy, False), (idle, True)))])
             words = self.words(place)
             done = each(at_work, self.laws.done(place))

@@ -224,3 +224,60 @@ def test_prove_shows_the_run_in_which_a_machine_closes_a_gate_after_the_vote(
     jsonschema.Draft202012Validator(SCHEMA).validate(data)
     (o4,) = [line for line in data["reports"][0]["standing"] if line["name"] == "O4"]
     assert o4["status"] == "violated"
+
+
+ZONE = """
+firable: 1
+cell: zone
+controllers:
+  r:
+    start: [free, zone]
+    places:
+      free:
+      zone:
+      work:       {send: {machine: R, command: WORK}, until: worked, within: 2s}
+      work_fault: {send: {machine: R, command: STOP}, UNTIL}
+      home:       {send: {machine: R, command: HOME}, until: homed}
+  q:
+    start: idle
+    places:
+      idle:
+      at_it:      {send: {machine: Q, command: WORK}, until: done}
+transitions:
+  begin:  {from: r.free, to: r.work}
+  end:    {from: r.work, to: r.free}
+  flee:   {from: [r.work_fault, r.zone], to: r.home}
+  back:   {from: r.home, to: [r.free, r.zone]}
+  q_on:   {from: [q.idle, r.zone], to: q.at_it}
+  q_off:  {from: q.at_it, to: [q.idle, r.zone]}
+"""
+ZONE_PLANT = """
+firable_plant: 1
+plant: zone
+stations: [table]
+arrivals:   {station: table, every_s: 5}
+departures: {station: table, after_s: 1}
+machines:
+  R:
+    commands:
+      WORK: {does: work, takes_s: 1, may_fail: for_good}
+      HOME: {does: work, takes_s: 1}
+      STOP: {does: stop, TAKES}
+  Q:
+    commands:
+      WORK: {does: work, takes_s: 1}
+"""
+
+
+@pytest.mark.parametrize(("until", "takes"), [("", ""), ("until: at_rest", ""), ("until: at_rest", "takes_s: 0.3")])
+def test_a_machine_that_has_failed_obeys_a_stop_and_hangs_at_what_comes_after_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], until: str, takes: str
+) -> None:
+    net, plant = tmp_path / "zone.firable.yaml", tmp_path / "zone.plant.yaml"
+    net.write_text(ZONE.replace(", UNTIL", f", {until}" if until else ""), "utf-8")
+    plant.write_text(ZONE_PLANT.replace(", TAKES", f", {takes}" if takes else ""), "utf-8")
+    assert main(["check", str(net), "--machines", str(plant), "--format", "json"]) == 0
+    (report,) = json.loads(capsys.readouterr().out)["reports"]
+    found = {verdict["name"]: verdict for verdict in report["verdicts"]}
+    assert {"q_on", "q_off", "flee", "back"} <= set(found["fault.R"]["subjects"])
+    assert found["fault.R"]["status"] == "violated"

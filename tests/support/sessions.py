@@ -50,9 +50,9 @@ def run(command: str, folder: Path, status: int = 0) -> subprocess.CompletedProc
 
 def run_here(command: str, folder: Path, status: int = 0) -> subprocess.CompletedProcess[str]:
     """Run a command as `run` does; one of firable that needs no shell in this process."""
-    words = shlex.split(command)
-    if words[0] != "firable" or _OF_A_SHELL.search(command):
+    if not command.startswith("firable ") or _OF_A_SHELL.search(command):
         return run(command, folder, status)
+    words = shlex.split(command)
     told = io.StringIO()
     with contextlib.chdir(folder), contextlib.redirect_stdout(told), contextlib.redirect_stderr(told):
         code = main(words[1:])

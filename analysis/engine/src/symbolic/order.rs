@@ -213,10 +213,11 @@ pub fn candidates(places: usize, transitions: &[Transition], watch: &mut Watch<'
     }
     watch.tick(BETWEEN)?;
     let best = found.iter().min_by_key(|pair| span(pair)).map(|pair| &pair[0]);
-    let spectral = best.and_then(|best| graph.spectral(best)).map(|order| both(graph.slide(order)));
+    let spectral = best.map(|best| graph.spectral(best, watch)).transpose()?.flatten();
+    let spectral = spectral.map(|order| both(graph.slide(order)));
     watch.tick(BETWEEN)?;
     if let Some(hubs) = graph.by_hub(transitions) {
-        // Where the hubs give the shorter arcs, those are as good as them but for disorder within the hubs.
+        // Where the hubs give the shorter arcs, what was found is as good but for disorder within the hubs.
         if found.iter().all(|pair| span(&hubs) < span(pair)) {
             found.clear();
         }
@@ -224,8 +225,13 @@ pub fn candidates(places: usize, transitions: &[Transition], watch: &mut Watch<'
     }
     found.extend(given.into_iter().chain(spectral));
     found.sort_by_cached_key(span);
-    found.dedup();
-    Ok(found.into_iter().flatten().collect())
+    let mut distinct: Vec<[Order; 2]> = Vec::new();
+    for pair in found {
+        if !distinct.iter().any(|other| other.contains(&pair[0])) {
+            distinct.push(pair);
+        }
+    }
+    Ok(distinct.into_iter().flatten().collect())
 }
 
 #[cfg(test)]

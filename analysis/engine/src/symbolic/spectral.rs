@@ -13,13 +13,17 @@
 //! many passes over the arcs as the net is long, and more to keep its vectors apart.
 
 use super::order::{Graph, Order};
+use crate::budget::{Stop, Watch};
 
 /// The entries that the envelope may have, and the multiplications that factoring it may take.
 const ENTRIES_MAX: usize = 1 << 21;
 const WORK_MAX: usize = 1 << 28;
-/// The rounds of inverse iteration: ends are nearer to each other than all else, so few are enough.
+/// The multiplications that are as much work as a look at the watch stands for.
+const TICK: usize = 8;
+/// The rounds of inverse iteration. Each shrinks what is left of the next eigenvector by the quotient of the two
+/// eigenvalues; where they are equal, as of a ring, any mixture of both does.
 const ROUNDS: usize = 30;
-/// What makes the matrix regular; the parts of a net that hang together would else be as loose as they are.
+/// Added to the diagonal: to move a part of the net as a whole has the eigenvalue 0, and the factor needs them positive.
 const SHIFT: f64 = 1e-9;
 
 /// A symmetric matrix, of which each row begins with its first entry and ends on the diagonal.
@@ -61,8 +65,10 @@ impl Envelope {
     }
 
     /// Replaces the matrix by its Cholesky factor.
-    fn factor(&mut self) {
+    fn factor(&mut self, watch: &mut Watch<'_>) -> Result<(), Stop> {
         for row in 0..self.first.len() {
+            let width = row + 1 - self.first[row];
+            watch.tick(1 + width * width / TICK)?;
             for column in self.first[row]..row {
                 let from = self.first[row].max(self.first[column]);
                 let pairs = self.row(row, from).iter().zip(self.row(column, from));
@@ -73,6 +79,7 @@ impl Envelope {
             let sum: f64 = self.row(row, self.first[row]).iter().map(|a| a * a).sum();
             self.entries[self.starts[row + 1] - 1] = (self.diagonal(row) - sum).max(SHIFT).sqrt();
         }
+        Ok(())
     }
 
     /// Solves a system by the factor.
@@ -94,9 +101,21 @@ impl Envelope {
 impl Graph {
     /// The places along the slowest vibration, part by part where the net falls into parts; None where that is too large
     /// in the order that it begins with.
-    pub(super) fn spectral(&self, order: &Order) -> Option<Order> {
+    pub(super) fn spectral(&self, order: &Order, watch: &mut Watch<'_>) -> Result<Option<Order>, Stop> {
         let mut position = vec![0; self.places];
         order.iter().enumerate().for_each(|(at, &place)| position[place as usize] = at);
+        let mut first: Vec<usize> = (0..self.places).collect();
+        let mut pairs = 0_usize;
+        for t in self.places..self.vertices() {
+            let ends = self.next_to(t as u32);
+            pairs = pairs.saturating_add(ends.len() * ends.len());
+            let least = ends.iter().map(|&place| position[place as usize]).min().unwrap_or(0);
+            for &place in ends {
+                let row = position[place as usize];
+                first[row] = first[row].min(least);
+            }
+        }
+        let Some(mut matrix) = Envelope::new(first).filter(|_| pairs <= WORK_MAX) else { return Ok(None) };
         let joined: Vec<Vec<usize>> = (self.places..self.vertices())
             .map(|t| {
                 let mut at: Vec<usize> = self.next_to(t as u32).iter().map(|&place| position[place as usize]).collect();
@@ -106,16 +125,9 @@ impl Graph {
             })
             .filter(|at| at.len() > 1)
             .collect();
-        let mut first: Vec<usize> = (0..self.places).collect();
-        for at in &joined {
-            at.iter().for_each(|&row| first[row] = first[row].min(at[0]));
-        }
         let part = parts(self.places, &joined);
-        let mut matrix = Envelope::new(first)?;
-        if joined.iter().map(|at| at.len() * at.len()).sum::<usize>() > WORK_MAX {
-            return None;
-        }
         for at in &joined {
+            watch.tick(1 + at.len() * at.len() / TICK)?;
             let pull = 1.0 / (at.len() - 1) as f64;
             for (end, &row) in at.iter().enumerate() {
                 matrix.add(row, row, 1.0);
@@ -123,15 +135,16 @@ impl Graph {
             }
         }
         (0..self.places).for_each(|row| matrix.add(row, row, SHIFT));
-        matrix.factor();
+        matrix.factor(watch)?;
         let mut moves: Vec<f64> = (0..self.places).map(|at| at as f64).collect();
         for _ in 0..ROUNDS {
+            watch.tick(1 + matrix.entries.len() / TICK)?;
             level_out(&mut moves, &part);
             matrix.solve(&mut moves);
         }
         let mut along: Vec<usize> = (0..self.places).collect();
         along.sort_by(|&a, &b| part[a].cmp(&part[b]).then(moves[a].total_cmp(&moves[b])));
-        Some(along.into_iter().map(|at| order[at]).collect())
+        Ok(Some(along.into_iter().map(|at| order[at]).collect()))
     }
 }
 
@@ -173,7 +186,22 @@ fn level_out(vector: &mut [f64], part: &[usize]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::budget::unwatched;
     use crate::net::Transition;
+
+    fn along(net: &Graph, order: &Order) -> Option<Order> {
+        let mut poll = unwatched;
+        net.spectral(order, &mut Watch::new(None, &mut poll)).unwrap()
+    }
+
+    #[test]
+    fn a_long_factorization_ends_in_time() {
+        // Two thousand places of which each is joined to all others a hundred away.
+        let net = graph(2000, (0..1900).map(|at| (at, at + 100)));
+        let order: Order = (0..2000).collect();
+        let mut poll = |_| Err(Stop::Cancelled);
+        assert_eq!(net.spectral(&order, &mut Watch::new(None, &mut poll)), Err(Stop::Cancelled));
+    }
 
     fn graph(places: usize, pairs: impl IntoIterator<Item = (u32, u32)>) -> Graph {
         let moves: Vec<Transition> =
@@ -188,7 +216,7 @@ mod tests {
     #[test]
     fn a_chain_is_laid_out_along_itself_whatever_it_began_with() {
         let chain = graph(30, (0..29).map(|at| (at, at + 1)));
-        let mut found = chain.spectral(&shuffled(30)).unwrap();
+        let mut found = along(&chain, &shuffled(30)).unwrap();
         if found[0] != 0 {
             found.reverse();
         }
@@ -199,7 +227,7 @@ mod tests {
     fn the_parts_of_a_net_come_one_after_the_other_each_along_itself() {
         // Two chains of ten, one of even and one of odd places, and two places that nothing joins.
         let apart = graph(22, (0..18).map(|at| (at, at + 2)));
-        let found = apart.spectral(&shuffled(22)).unwrap();
+        let found = along(&apart, &shuffled(22)).unwrap();
         let chains: Vec<Vec<u32>> =
             [0, 1].map(|odd| found.iter().copied().filter(|&at| at < 20 && at % 2 == odd).collect()).into();
         for mut chain in chains {
@@ -219,7 +247,8 @@ mod tests {
         for (row, values) in full.iter().enumerate() {
             (matrix.first[row]..=row).for_each(|column| matrix.add(row, column, values[column]));
         }
-        matrix.factor();
+        let mut poll = unwatched;
+        matrix.factor(&mut Watch::new(None, &mut poll)).unwrap();
         let wanted = [1.0, -2.0, 3.0, 0.5];
         let mut vector = full.map(|row| row.iter().zip(wanted).map(|(a, b)| a * b).sum::<f64>());
         matrix.solve(&mut vector);
@@ -231,7 +260,7 @@ mod tests {
         let places = 1 << 12;
         let star = graph(places, (1..places as u32).map(|at| (0, at)));
         let order: Order = (0..places as u32).collect();
-        assert!(star.spectral(&order).is_none());
-        assert!(graph(0, []).spectral(&Vec::new()).unwrap().is_empty());
+        assert!(along(&star, &order).is_none());
+        assert!(along(&graph(0, []), &Vec::new()).unwrap().is_empty());
     }
 }
