@@ -112,14 +112,14 @@ class Stage:
         return replace(scene, busy={machine: at for machine, at in scene.busy.items() if at != name})
 
     def signal(self, scene: Scene, signal: str) -> Scene:
-        """A signal has become 1: it completes a command, or sees a workpiece that has come."""
+        """A signal has become 1: it completes a command, or sees a workpiece that has come, or is in a hand."""
         for name in tuple(scene.busy.values()):
             if self.net.place(name).completion == signal:
                 scene = self.done(scene, name)
         sensor = self.plant.sensors.get(signal)
         if sensor is not None and sensor.occupied == self.plant.arrivals.station:
             scene = self._arrives(scene, self.plant.arrivals.station)
-        return scene
+        return self._held(scene, signal)
 
     def fired(self, scene: Scene, transitions: Iterable[str], *, sends: bool) -> Scene:
         """Transitions have fired; with `sends` the commands of the places entered go out too.
@@ -133,6 +133,8 @@ class Stage:
                 continue
             transition = self.net.transition(name)
             opened = {gate.signal for gate in transition.external if gate.wanted}
+            for signal in opened:
+                scene = self._held(scene, signal)
             for place in transition.inputs:
                 completed = self.net.place(place).completion in opened
                 scene = self.done(scene, place) if completed else self.left(scene, place)
@@ -187,6 +189,15 @@ class Stage:
             return scene
         number = scene.arrived + 1
         return replace(scene, pieces=(*scene.pieces, Piece(number, station)), arrived=number)
+
+    def _held(self, scene: Scene, signal: str) -> Scene:
+        """A sensor that sees a workpiece in a hand is believed: a grasp that was given up may have been done."""
+        sensor = self.plant.sensors.get(signal)
+        machine = sensor.holding if sensor is not None else None
+        if machine is None or scene.on(machine) is not None:
+            return scene
+        at = self.plant.machines[machine].positions.get(scene.hands.get(machine, ""))
+        return scene if at is None else scene.moved(at, machine)
 
     def _action(self, place: Place) -> Any:
         command = place.command

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from itertools import combinations
+from pathlib import Path
 
 import pytest
 
@@ -12,6 +14,7 @@ from firable.cli.view.top_view import top_view
 from firable.nets.catalogue import catalogue_names, catalogue_net, catalogue_path
 from firable.nets.diagnostics import InputError
 from firable.nets.machines.plant_file import PlantModel, parse_plant, read_plant
+from firable.nets.text import parse_net
 from firable.semantics.trace import Discipline, Trace
 
 PLANTS = {
@@ -81,6 +84,22 @@ def test_a_sensor_shows_that_a_workpiece_has_come_and_only_one() -> None:
     stage = Stage(catalogue_net("one_robot"), plant("one_robot"))
     scene = stage.signal(stage.signal(stage.begin(), "conveyor.part_at_entry"), "conveyor.part_at_entry")
     assert scene.pieces == (Piece(1, "cv1_entry"),)
+
+
+def test_a_sensor_of_a_hand_is_believed_after_a_grasp_that_was_given_up() -> None:
+    manual = (Path(__file__).parents[2] / "docs" / "time-limits.md").read_text("utf-8")
+    net, plant_file = re.findall(r"^```yaml\n(.*?)^```", manual.partition("given twice\n")[2], re.MULTILINE | re.DOTALL)
+    stage = Stage(parse_net(net), parse_plant(plant_file))
+    for seen in (True, False):
+        scene = stage.fired(stage.signal(stage.begin(), "robot.part_there"), ("start",), sends=True)
+        scene = stage.fired(stage.signal(scene, "robot.arrived"), ("grip",), sends=True)
+        scene = stage.fired(scene, ("robot.grasp_timeout",), sends=True)
+        assert scene.pieces == (Piece(1, "table"),)
+        scene = stage.signal(scene, "robot.in_hand") if seen else scene
+        scene = stage.signal(scene, "robot.at_rest")
+        assert (scene.busy, [piece.on for piece in scene.pieces]) == ({}, ["R" if seen else "table"])
+        scene = stage.signal(stage.fired(scene, ("late",), sends=True), "robot.arrived")
+        assert (scene.hands, [piece.on for piece in scene.pieces]) == ({"R": "EXIT"}, ["R"])
 
 
 def test_the_gripper_of_an_arm_that_carries_is_its_own_station_and_a_belt_has_none() -> None:
