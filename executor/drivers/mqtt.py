@@ -14,15 +14,16 @@ on a topic of its own: the broker answers on one connection in order.
 from __future__ import annotations
 
 import asyncio
+import errno
 import logging
 import math
 import re
 import socket
 import uuid
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib import import_module
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final, cast
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -71,6 +72,24 @@ class MqttOptions(Options):
     user: str | None = None
     password: Password = None
     tls: bool | MqttTls = False
+
+
+class Guarded:
+    """An event loop for aiomqtt, which asks for a socket to be watched a turn later: it may be closed by then."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self.loop = loop
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.loop, name)
+
+    def add_reader(self, fd: int, callback: Callable[[], object]) -> None:
+        """Have a socket watched for what comes; not one that is closed, whose end is told elsewhere."""
+        _unless_closed(self.loop.add_reader, fd, callback)
+
+    def add_writer(self, fd: int, callback: Callable[[], object]) -> None:
+        """Have a socket watched for room; likewise."""
+        _unless_closed(self.loop.add_writer, fd, callback)
 
 
 class MqttConnection(Stepwise):
@@ -145,6 +164,16 @@ class MqttConnection(Stepwise):
                         pass
 
 
+def _unless_closed(
+    watch: Callable[[int, Callable[[], object]], object], fd: int, callback: Callable[[], object]
+) -> None:
+    try:
+        watch(fd, callback)
+    except OSError as error:
+        if error.errno != errno.EBADF:
+            raise
+
+
 def _why(error: MqttError) -> str:
     """What has failed, without the number that stands before it."""
     return _NUMBER.sub("", str(error))
@@ -185,6 +214,7 @@ class Mqtt:
             tls_params=tls,
             socket_options=[DROPPING],
         )
+        client._loop = cast("asyncio.AbstractEventLoop", Guarded(asyncio.get_running_loop()))
         client._client.connect_timeout = wanted.timeout_s  # of a thread that no cancellation ends, nor a stop before it
         connection = MqttConnection(client, wanted)
         try:

@@ -20,7 +20,7 @@ from firable.executor.drivers.far_side.ends import PORTS
 from firable.executor.drivers.far_side.machine import ROLES
 from firable.executor.drivers.far_side.mqtt_device import MqttEnd, mosquitto
 from firable.executor.drivers.far_side.ports import free_port
-from firable.executor.drivers.mqtt import KIND, MqttOptions
+from firable.executor.drivers.mqtt import KIND, Guarded, MqttOptions
 
 ALIVE = "alive: {read: cell/M/button,within_s: 600}"
 """What a broker's device needs for an emergency stop; here it does not change."""
@@ -74,6 +74,31 @@ def test_a_connection_that_is_given_up_before_a_frozen_broker_has_answered_leave
         return left
 
     assert asyncio.run(main()) == []
+
+
+def test_a_socket_that_is_closed_before_it_is_watched_leaves_no_error_to_the_event_loop() -> None:
+    async def test() -> tuple[list[str], list[object]]:
+        loop, called, left = asyncio.get_running_loop(), list[str](), list[object]()
+        loop.set_exception_handler(lambda _loop, context: left.append(context["exception"]))
+        guarded, (one, other) = Guarded(loop), socket.socketpair()
+        closed = os.dup(one.fileno())
+        os.close(closed)
+        for fd in (closed, one.fileno()):
+            guarded.call_soon_threadsafe(
+                guarded.add_writer, fd, lambda fd=fd: called.append(f"writer of {fd == closed}")
+            )
+            guarded.call_soon_threadsafe(
+                guarded.add_reader, fd, lambda fd=fd: called.append(f"reader of {fd == closed}")
+            )
+        other.send(b"?")
+        await until(lambda: len(set(called)) == 2, "both are called")
+        loop.remove_writer(one.fileno())
+        loop.remove_reader(one.fileno())
+        one.close()
+        other.close()
+        return sorted(set(called)), left
+
+    assert asyncio.run(test()) == (["reader of False", "writer of False"], [])
 
 
 def test_broker_that_no_packet_reaches_is_not_waited_for_beyond_the_attempt_to_connect() -> None:
