@@ -12,8 +12,9 @@
 //!   sides with their neighbours, and a ring whose nodes are in such disorder takes four times the time. It is left
 //!   out of nets so long that it would take longer than it saves.
 //!
-//! All of these go by what is next to a place. Where a net is a chain of many parts that are alike, they fold some parts into
-//! each other; the *spectral* order, along the slowest vibration of the net, lays it out as a whole, and slides as well.
+//! All of these go by what is next to a place. Where a net is a chain of many parts that are alike, they fold some parts
+//! into each other; the *spectral* order, along the slowest vibration of the net, lays it out as a whole, and slides as
+//! well.
 //!
 //! Beside them, a resource and all who may hold it are kept together as one *hub*, and the hubs alone are put in order:
 //! each hub then remembers who holds it in the same way, which matters more than spans, and which no sum of them sees.

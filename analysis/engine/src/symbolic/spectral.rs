@@ -3,9 +3,9 @@
 //! Let each transition pull its places together by springs, one between each two. Of all ways in which the net can swing,
 //! the slowest has the two ends of it move against each other, and what lies between in between: by how far a place moves,
 //! it has its place in a row (Barnard, Pothen, Simon 1995: the eigenvector of the second smallest eigenvalue of the
-//! Laplacian). Nothing local decides it. So where a net is a chain of parts that are all alike, each part comes out whole and
-//! laid out like its neighbours, where numberings from an end, and FORCE, which only ever looks at what is next, fold parts
-//! into each other; of ten such parts one is hardly noticed, and all ten are a thousand times the work.
+//! Laplacian). Nothing local decides it. So where a net is a chain of parts that are all alike, each part comes out whole
+//! and laid out like its neighbours. Numberings from an end, and FORCE, which only ever looks at what is next, fold such
+//! parts into each other, and what that costs in the search grows with each part.
 //!
 //! The vector is found by inverse iteration: the matrix is factored once, row by row from the first entry that is not
 //! zero (an envelope), in an order that is good already, so that the rows are short; each round is two passes over
@@ -196,7 +196,7 @@ mod tests {
 
     #[test]
     fn a_long_factorization_ends_in_time() {
-        // Two thousand places of which each is joined to all others a hundred away.
+        // Two thousand places of which each is joined to the one that comes a hundred later.
         let net = graph(2000, (0..1900).map(|at| (at, at + 100)));
         let order: Order = (0..2000).collect();
         let mut poll = |_| Err(Stop::Cancelled);
