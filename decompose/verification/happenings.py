@@ -12,6 +12,8 @@ place waits until then.
     T                  a transition of the cell fires
     sent/P             late, the command of place P reaches its machine, or cannot be taken: an accident, and all ends
     M/done/P           the machine is done with it;           M/accident/P   it ends in an accident
+    M/still-done/P     what M breaks off, because it is stopped at P, is done before it has come to rest;
+    M/still-accident/P it ends in an accident
     M/fails/P          M, at the command of P, fails, while no other machine has;   M/repaired   it goes on
     S/shown            the sensor of an acknowledged completion shows it
     arrives/E, leaves/E   a workpiece comes, or is taken away
@@ -64,6 +66,10 @@ class Plant(Things):
             if place.name not in self.stops:
                 yield f"{self.machine_of(place)}/done/{place.name}", partial(self.done, place)
                 yield f"{self.machine_of(place)}/accident/{place.name}", partial(self.spoils, place)
+        for name in self.model.machines:
+            for place in self.broken_off(name):
+                yield f"{name}/still-done/{place.name}", partial(self.still_done, place)
+                yield f"{name}/still-accident/{place.name}", partial(self.still_spoils, place)
         for place in self.failing:
             yield f"{self.machine_of(place)}/fails/{place.name}", partial(self.fails, place)
         for name in self.may_fail if self.faults is Faults.REPAIRED else ():
@@ -138,7 +144,7 @@ class Plant(Things):
         name, action = self.machine_of(place), self.action(place)
         at, has = f"at {name}", f"has {name}"
         if isinstance(action, Stop):
-            yield {at: None if place.name in self.stops else place.name}
+            yield from self.stopped(place, state)
         elif state[at] is not None:
             yield {OVERRUN: True}
         elif isinstance(action, (Grasp, Put)):
@@ -154,6 +160,21 @@ class Plant(Things):
         else:
             yield {at: place.name}
 
+    def stopped(self, place: Place, state: State) -> Iterator[Changes]:
+        """A machine leaves what it is at undone, or breaks it off: that may still be done until it is at rest."""
+        name = self.machine_of(place)
+        at, breaks = f"at {name}", f"breaks off {name}"
+        changes: Changes = {at: None if place.name in self.stops else place.name}
+        if state[at] is not None and breaks in self.things:
+            was = self.net.place(str(state[at]))
+            if isinstance(self.action(was), Stop):
+                changes |= {breaks: None} if place.name in self.stops else {}
+            elif was in self.broken_off(name) and place.name not in self.stops:
+                if state[breaks] is not None:
+                    return  # a machine that is at a command has broken off none
+                changes |= {breaks: was.name}
+        yield changes
+
     def done(self, place: Place, state: State) -> Iterator[Changes]:
         """A machine is done with what it is at: the effect, what sensors see of it, and the completion."""
         name = self.machine_of(place)
@@ -164,6 +185,8 @@ class Plant(Things):
         for effect in self.effect(place, state):
             for seen in self.sensors_see(effect, state):
                 changes: Changes = {f"at {name}": None, **effect, **seen}
+                if isinstance(self.action(place), Stop) and f"breaks off {name}" in self.things:
+                    changes[f"breaks off {name}"] = None
                 yield from ({**changes, **formed} for formed in self.formed(place, _Overlaid(changes, state)))
 
     def effect(self, place: Place, state: State) -> Iterator[Changes]:
@@ -205,6 +228,20 @@ class Plant(Things):
         at_work = state[f"at {name}"] == place.name and not self.has_failed(name, state)
         if at_work and self.goes_wrong(name, action, place, state):
             yield {f"at {name}": None, ACCIDENT: True}
+
+    def still_done(self, place: Place, state: State) -> Iterator[Changes]:
+        """What a machine breaks off has its effect before it is at rest; nobody acknowledges it."""
+        breaks = f"breaks off {self.machine_of(place)}"
+        if state[breaks] == place.name and not self.has_failed(self.machine_of(place), state):
+            for effect in self.effect(place, state):
+                yield from ({breaks: None, **effect, **seen} for seen in self.sensors_see(effect, state))
+
+    def still_spoils(self, place: Place, state: State) -> Iterator[Changes]:
+        """It ends in an accident before the machine is at rest."""
+        name = self.machine_of(place)
+        still = state[f"breaks off {name}"] == place.name and not self.has_failed(name, state)
+        if still and self.goes_wrong(name, self.action(place), place, state):
+            yield {f"breaks off {name}": None, ACCIDENT: True}
 
     def has_failed(self, machine: str, state: State) -> bool:
         """Whether a machine has failed: nothing that it is at gets done then, but a stop."""

@@ -13,7 +13,18 @@ from functools import cached_property
 from typing import Final
 
 from firable.nets.machines.loop import Faults, Sending
-from firable.nets.machines.plant_file import Action, Carry, Clamp, Failure, PlantModel, Process, Release, Sensor, Stop
+from firable.nets.machines.plant_file import (
+    Action,
+    Carry,
+    Clamp,
+    Failure,
+    PlantModel,
+    Process,
+    Release,
+    Sensor,
+    Stop,
+    Work,
+)
 from firable.nets.net import Net, Place, SignalKind
 
 ACCIDENT: Final = "accident"
@@ -58,6 +69,10 @@ class Things:
             at: dict[Value, str] = {None: f"plant.{name}.idle"}
             at |= {p.name: f"plant.{name}.at.{p.name}" for p in self.commanding if self.machine_of(p) == name}
             found[f"at {name}"] = at
+            if self.broken_off(name):
+                breaks: dict[Value, str] = {None: f"plant.{name}.breaks_off_nothing"}
+                breaks |= {p.name: f"plant.{name}.breaks_off.{p.name}" for p in self.broken_off(name)}
+                found[f"breaks off {name}"] = breaks
             if machine.hand is not None:
                 hands: dict[Value, str] = {where: f"plant.{name}.hand_at.{where}" for where in machine.positions}
                 found[f"hand {name}"] = hands
@@ -106,6 +121,15 @@ class Things:
         """Those whose command stops the machine at once: it takes no time, and nobody waits for its end."""
         some = ((place, self.action(place)) for place in self.commanding if place.completion is None)
         return {place.name for place, one in some if isinstance(one, Stop) and not one.takes_s and not one.jitter_s}
+
+    def broken_off(self, machine: str) -> list[Place]:
+        """Those whose command a stop of the machine may break off: not that of a stop, nor one that does nothing; none
+        where the machine is always stopped at once."""
+        own = [place for place in self.commanding if self.machine_of(place) == machine]
+        stops = [place for place in own if isinstance(self.action(place), Stop)]
+        if all(place.name in self.stops for place in stops):
+            return []
+        return [place for place in own if place not in stops and not isinstance(self.action(place), Work)]
 
     @cached_property
     def failing(self) -> tuple[Place, ...]:

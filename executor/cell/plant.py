@@ -77,8 +77,8 @@ class _Busy:
     parameters: Mapping[str, str]
     ticket: Ticket
     waits: bool = False
-    breaks_off: bool = False
-    """Whether it is a stop that came while the machine was at another command."""
+    breaks_off: _Busy | None = None
+    """Of a stop, the command that the machine was at when it came."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,8 +228,11 @@ class Plant:
             case _Departure():
                 self._depart()
             case _Finish(machine, busy):
-                if self.machines[machine].busy is busy:
+                at = self.machines[machine].busy
+                if at is busy:
                     yield from self._finish(machine, busy)
+                elif at is not None and at.breaks_off is busy and self.random.random() < 0.5:
+                    self._take_effect(machine, busy)  # the machine was so near the end that it is done before it rests
             case _Press(signal):
                 if self.machines[str(self.model.sensors[signal].acknowledges)].busy is None:
                     self.pressed.add(signal)
@@ -268,7 +271,7 @@ class Plant:
             raise _FaultError(f"{name} does not know the command {busy.command}")
         machine.times[busy.command] = machine.times.get(busy.command, 0) + 1
         if isinstance(action, Stop):
-            machine.busy = busy = replace(busy, breaks_off=self._has_something_to_end(machine))
+            machine.busy = busy = replace(busy, breaks_off=self._to_break_off(machine))
             if action.takes_s + action.jitter_s or self._hangs(name, busy):
                 self._take_time(name, busy, action)
             else:
@@ -309,12 +312,23 @@ class Plant:
     def _hangs(self, name: str, busy: _Busy) -> Disturbance | None:
         return self.disturbances.hangs(name, busy.command, self.machines[name].times[busy.command])
 
-    def _has_something_to_end(self, machine: _MachineNow) -> bool:
-        """Whether a stop leaves something undone; one that is not over yet has nothing to do but what it broke off."""
+    def _to_break_off(self, machine: _MachineNow) -> _Busy | None:
+        """What a stop would break off; at a stop that is not over yet, what that one has."""
         at = machine.busy
-        return at is not None and (at.breaks_off or not isinstance(machine.model.commands[at.command], Stop))
+        return at.breaks_off if at is not None and isinstance(machine.model.commands[at.command], Stop) else at
 
     def _finish(self, name: str, busy: _Busy) -> Iterator[PlantReport]:
+        machine = self.machines[name]
+        if not self._take_effect(name, busy):
+            machine.busy = replace(busy, waits=True)
+            return
+        machine.busy = None
+        for key, sensor in self._keys(name) if busy.breaks_off is not None else ():
+            self._in(sensor.after_s, 0.0, _Press(key))
+        yield CommandDone(busy.ticket)
+
+    def _take_effect(self, name: str, busy: _Busy) -> bool:
+        """Do what a command does in the end; False: the station is full, and the machine waits."""
         machine = self.machines[name]
         action = machine.model.commands[busy.command]
         match action:
@@ -328,13 +342,11 @@ class Plant:
             case Put(when_full=when_full):
                 station = machine.model.positions[busy.parameters["at"]]
                 if when_full == "wait" and self._full(station):
-                    machine.busy = replace(busy, waits=True)
-                    return
+                    return False
                 self._lay(name, machine, station)
             case Carry(target=target, when_full=when_full):
                 if when_full == "wait" and self._full(target):
-                    machine.busy = replace(busy, waits=True)
-                    return
+                    return False
                 self._lay(name, machine, target)
             case Clamp(station=station):
                 self._lying(station, f"{name} clamps on {station}")
@@ -347,10 +359,7 @@ class Plant:
             held = "nothing, for it holds nothing" if machine.holding is None else f"workpiece {machine.holding.id}"
             self.befallen.append((drops, f"{name} drops {held}, as {busy.command} ends"))
             machine.holding = None
-        machine.busy = None
-        for key, sensor in self._keys(name) if busy.breaks_off else ():
-            self._in(sensor.after_s, 0.0, _Press(key))
-        yield CommandDone(busy.ticket)
+        return True
 
     def _position(self, machine: _MachineNow, name: str, busy: _Busy, parameter: str) -> str:
         position = busy.parameters.get(parameter)

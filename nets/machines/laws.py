@@ -8,8 +8,11 @@ each condition is one gate. What cannot be done (laying a workpiece on another, 
 
 A command acts at two instants. It is *sent*: what it wants is checked, and a conveyor takes its workpiece. It is
 *done*: the effect, and its completion bit, formed with the sensor of that name where the plant has one. Between them
-lies any time. Workpieces are told apart by one bit, whether they were machined; simulation has identities, which would
-make the number of markings grow with the number of workpieces and which no law asks for.
+lies any time. A stop at once leaves undone what the machine is at. One that lasts *breaks it off*: until the machine
+has come to rest that may still have its effect, unacknowledged, or end in its accident.
+
+Workpieces are told apart by one bit, whether they were machined; simulation has identities, which would make the number
+of markings grow with the number of workpieces and which no law asks for.
 """
 
 from __future__ import annotations
@@ -96,6 +99,25 @@ class Laws:
         """The place that says that a machine is at no command."""
         return f"{PLANT}.{machine}.idle"
 
+    @cached_property
+    def broken_off(self) -> dict[str, tuple[Place, ...]]:
+        """For each machine that a stop brings to rest in some time, the places whose commands it breaks off: those that
+        still do something when they are done."""
+        found = {}
+        for machine in self.model.machines:
+            own = [(place, self.action(place)) for place in self.commanding if self.machine(place)[0] == machine]
+            if any(isinstance(action, Stop) and self.lasts(place) for place, action in own):
+                found[machine] = tuple(place for place, action in own if not isinstance(action, (Stop, Work)))
+        return {machine: places for machine, places in found.items() if places}
+
+    def breaks_off(self, place: Place) -> str:
+        """The place that says that the command of a place was broken off by a stop, and may still be done."""
+        return f"{PLANT}.{_command(place).machine}.breaks_off.{place.name}"
+
+    def nothing_broken_off(self, machine: str) -> str:
+        """The place that says that nothing that was broken off at a machine may still be done."""
+        return f"{PLANT}.{machine}.breaks_off_nothing"
+
     def hand_at(self, machine: str, position: str) -> str:
         """The place that says where a hand is."""
         return f"{PLANT}.{machine}.hand_at.{position}"
@@ -127,6 +149,11 @@ class Laws:
             for place in self.commanding:
                 if _command(place).machine == name:
                     yield fact(self.busy(place), f"{name} is at {_words(place)}")
+            if broken_off := self.broken_off.get(name, ()):
+                yield fact(self.nothing_broken_off(name), f"{name} breaks off nothing", marked=True)
+                for place in broken_off:
+                    words = f"{name} breaks off {_words(place)}, which may still be done"
+                    yield fact(self.breaks_off(place), words)
             for position in machine.positions if machine.hand is not None else ():
                 yield fact(
                     self.hand_at(name, position),
@@ -168,19 +195,56 @@ class Laws:
                 yield Case(free, taken)
 
     def _stopped(self, name: str, place: Place) -> Iterator[Case]:
-        """Whatever a machine is at ends; then it is at the stop for a while, or idle at once."""
+        """Whatever a machine is at ends, or is broken off; then it is at the stop for a while, or idle at once."""
         idle, now_at = self.idle(name), self.busy(place) if self.lasts(place) else None
+        free: tuple[Literal, ...] = () if now_at is None else ((now_at, False),)
         rest = ((now_at, True), (idle, False)) if now_at is not None else ((idle, True),)
-        yield Case(((idle, True), *([(now_at, False)] if now_at is not None else [])), rest, f"{name}-idle")
+        yield Case(((idle, True), *free), rest, f"{name}-idle")
         for other in self.commanding:
             at = self.busy(other)
             if self.machine(other)[0] != name or not self.lasts(other):
                 continue
+            to_come = f"{name} is still to come to rest"
             if at == now_at:
-                yield Case(((at, True), (idle, False)), tag=f"{name}-stops", says=f"{name} is still to come to rest")
+                yield Case(((at, True), (idle, False)), tag=f"{name}-stops", says=to_come)
+                continue
+            stops = Case(((at, True), (idle, False), *free), ((at, False), *rest), f"stops-{other.name}")
+            if not isinstance(self.action(other), Stop):
+                yield stops.with_(self._broken_off(other) if now_at is not None else self._undone(other))
+            elif now_at is None:
+                yield from map(stops.with_, self._at_rest(name))
             else:
-                now = ((at, True), (idle, False), *([(now_at, False)] if now_at is not None else []))
-                yield Case(now, ((at, False), *rest), f"stops-{other.name}", f"{name} leaves {_words(other)} undone")
+                yield stops.with_(Case(says=to_come))
+
+    def _undone(self, place: Place) -> Case:
+        return Case(says=f"{self.machine(place)[0]} leaves {_words(place)} undone")
+
+    def _broken_off(self, place: Place) -> Case:
+        """A machine that comes to rest in some time may still do what it was at."""
+        name = self.machine(place)[0]
+        if place not in self.broken_off.get(name, ()):
+            return self._undone(place)
+        leaves, wants = self._over(place)
+        return Case(wants, leaves, says=f"{name} breaks off {_words(place)}")
+
+    def _at_rest(self, name: str) -> Iterator[Case]:
+        """A machine has come to rest: what was broken off is never done."""
+        if name not in self.broken_off:
+            yield Case()
+            return
+        yield Case(((self.nothing_broken_off(name), True),))
+        for place in self.broken_off[name]:
+            yield Case(*self._over(place), f"undone-{place.name}", self._undone(place).says)
+
+    def _over(self, place: Place) -> tuple[tuple[Literal, ...], tuple[Literal, ...]]:
+        """What it wants and leaves that what was broken off no longer is."""
+        name = self.machine(place)[0]
+        wants = ((self.breaks_off(place), True), (self.nothing_broken_off(name), False))
+        return wants, tuple((fact, not value) for fact, value in wants)
+
+    def still(self, place: Place) -> Case:
+        """The machine does what it breaks off before it has come to rest: `done` or `spoiled` says what."""
+        return Case(*self._over(place))
 
     def refused(self, place: Place) -> Iterator[Case]:
         """The accidents that sending the command of a place can be: each wants that none before it happens."""
@@ -257,7 +321,9 @@ class Laws:
                 fixed = self.clamped(station)
                 yield Case(((fixed, True),), ((fixed, False),))
                 yield Case(((fixed, False),), tag="again")
-            case Work() | Stop():
+            case Stop():
+                yield from self._at_rest(name)
+            case Work():
                 yield Case()
 
     def spoiled(self, place: Place) -> Iterator[Case]:

@@ -32,6 +32,11 @@ class Case:
     tag: str = ""
     says: str = ""
 
+    def with_(self, other: Case) -> Case:
+        """This case and one of other places, as one."""
+        tag, says = "-".join(filter(None, (self.tag, other.tag))), "; ".join(filter(None, (self.says, other.says)))
+        return Case((*self.wants, *other.wants), (*self.leaves, *other.leaves), tag, says)
+
 
 @dataclass(frozen=True, slots=True)
 class Moment:

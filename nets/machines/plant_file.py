@@ -128,7 +128,7 @@ class Work(_Timed):
 class Stop(_Model):
     """Stop whatever the machine does; at once, or, with `takes_s`, as long as it takes to come to rest.
 
-    What it was at is left undone in the moment in which the machine takes the stop.
+    At once what it was at is left undone; else it may still be done before the machine has come to rest.
     """
 
     does: Literal["stop"]

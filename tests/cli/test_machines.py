@@ -281,3 +281,81 @@ def test_a_machine_that_has_failed_obeys_a_stop_and_hangs_at_what_comes_after_it
     found = {verdict["name"]: verdict for verdict in report["verdicts"]}
     assert {"q_on", "q_off", "flee", "back"} <= set(found["fault.R"]["subjects"])
     assert found["fault.R"]["status"] == "violated"
+
+
+GRIPPING = """
+firable: 1
+cell: gripping
+controllers:
+  r:
+    start: free
+    inputs: [part_there, in_hand, reset]
+    places:
+      free:
+      to_table:    {send: {machine: R, command: MOVE, to: TABLE}, until: arrived}
+      grasp:       {send: {machine: R, command: GRASP, at: TABLE}, until: grasped, within: 2s}
+      grasp_fault: {send: {machine: R, command: STOP}}
+      to_exit:     {send: {machine: R, command: MOVE, to: EXIT}, until: arrived}
+      put:         {send: {machine: R, command: PUT, at: EXIT}, until: laid_down}
+transitions:
+  start:   {from: r.free, to: r.to_table, if: r.part_there}
+  grip:    {from: r.to_table, to: r.grasp}
+  carry:   {from: r.grasp, to: r.to_exit}
+  again:   {from: r.grasp_fault, to: r.grasp, if: r.reset}
+  release: {from: r.to_exit, to: r.put}
+  end:     {from: r.put, to: r.free}
+"""
+GRIPPING_PLANT = """
+firable_plant: 1
+plant: gripping
+stations: [table, exit]
+arrivals:   {station: table, every_s: 5}
+departures: {station: exit, after_s: 1}
+machines:
+  R:
+    hand: EXIT
+    positions: {TABLE: table, EXIT: exit}
+    commands:
+      MOVE:  {does: move,  takes_s: 1}
+      GRASP: {does: grasp, takes_s: 1}
+      PUT:   {does: put,   takes_s: 0.5, when_full: wait}
+      STOP:  {does: stop}
+sensors:
+  r.part_there: {occupied: table}
+  r.in_hand:    {holding: R}
+  r.reset:      {acknowledges: R, after_s: 3}
+"""
+AT_REST = GRIPPING.replace("command: STOP}}", "command: STOP}, until: at_rest}")
+LOOKING = AT_REST.replace("if: r.reset}", "if: r.reset, unless: r.in_hand}")
+LATE = "\n  late:    {from: r.grasp_fault, to: r.to_exit, if: r.in_hand}\n"
+
+
+def accident(folder: Path, capsys: pytest.CaptureFixture[str], cell: str, stop: str) -> list[str]:
+    """The run to an accident of a cell whose stop takes time, or does not; none where all goes well."""
+    net, plant = folder / "gripping.firable.yaml", folder / "gripping.plant.yaml"
+    net.write_text(cell, "utf-8")
+    plant.write_text(GRIPPING_PLANT.replace("{does: stop}", stop), "utf-8")
+    assert main(["check", str(net), "--machines", str(plant), "--format", "json"]) in (0, 1)
+    (report,) = json.loads(capsys.readouterr().out)["reports"]
+    found = [v for v in report["verdicts"] if v["name"] in ("loop.accidents", "loop.busy-machines")]
+    assert {verdict["status"] for verdict in found} <= {"proved", "violated"}
+    return [name for verdict in found for step in verdict.get("witness", {}).get("firings", ()) for name in step]
+
+
+@pytest.mark.parametrize(
+    ("cell", "stop", "ends"),
+    [
+        (GRIPPING, "{does: stop}", ()),
+        (AT_REST, "{does: stop}", ("R/still-done/r.grasp", "R/done/r.grasp_fault", "again/R-holds")),
+        (AT_REST, "{does: stop, takes_s: 0.3}", ("R/still-done/r.grasp", "R/done/r.grasp_fault", "again/R-holds")),
+        (LOOKING + LATE, "{does: stop, takes_s: 0.3}", ()),
+        (LOOKING.replace("}, until: at_rest}", "}}") + LATE, "{does: stop, takes_s: 0.3}", ("again/R-busy",)),
+    ],
+)
+def test_what_a_stop_breaks_off_may_still_be_done_until_the_machine_is_at_rest(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], cell: str, stop: str, ends: tuple[str, ...]
+) -> None:
+    """Where nobody looks afterwards whether the part is in the hand, it is grasped again."""
+    run = accident(tmp_path, capsys, cell, stop)
+    assert [name for name in run if name in ends] == list(ends)
+    assert bool(run) == bool(ends)

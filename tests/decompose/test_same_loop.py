@@ -78,7 +78,9 @@ def other_plants(model: PlantModel, seed: int) -> PlantModel:
                 action["when_full"] = draw.choice(["collide", "wait"])
             if draw.random() < 0.1:
                 machine["commands"][name] = draw.choice(OTHER_COMMANDS)
-            elif action["does"] != "stop":
+            elif action["does"] == "stop":
+                action["takes_s"] = draw.choice([0.0, 1.0])
+            else:
                 action["may_fail"] = draw.choice(["repairable", "for_good", None])
     return PlantModel.model_validate(data)
 
@@ -96,6 +98,63 @@ def test_both_readings_agree_on_plants_of_every_kind() -> None:
         count += 1
         assert compare(Plant(net, model, sending, faults), loop) > 1000
     assert count > 10
+
+
+STOPS = """
+firable: 1
+cell: stops
+controllers:
+  r:
+    start: free
+    places:
+      free:
+      grasp: {send: {machine: R, command: GRASP, at: TABLE}, until: grasped}
+      open:  {send: {machine: R, command: OPEN}, until: opened}
+      halt:  {send: {machine: R, command: STOP}}
+      brake: {send: {machine: R, command: STOP}, until: braked}
+      rest:  {send: {machine: R, command: STOP}, until: at_rest}
+transitions:
+  grip:  {from: r.free, to: r.grasp}
+  open:  {from: r.grasp, to: r.open}
+  leave: {from: r.open, to: r.brake}
+  brake: {from: r.free, to: r.brake}
+  rest:  {from: r.brake, to: r.rest}
+  halt:  {from: r.rest, to: r.halt}
+  again: {from: r.halt, to: r.free}
+"""
+STOPS_PLANT = """
+firable_plant: 1
+plant: stops
+stations: [table]
+arrivals:   {station: table, every_s: 5}
+departures: {station: table, after_s: 9}
+machines:
+  R:
+    hand: TABLE
+    positions: {TABLE: table}
+    commands:
+      GRASP: {does: grasp, takes_s: 1, may_fail: repairable}
+      OPEN:  {does: work, takes_s: 1}
+      STOP:  {does: stop}
+sensors: {}
+"""
+
+
+@pytest.mark.parametrize(("sending", "faults"), KINDS)
+def test_both_readings_agree_on_stops_at_once_and_in_time_of_one_machine(sending: Sending, faults: Faults) -> None:
+    net, model = parse_net(STOPS), parse_plant(STOPS_PLANT)
+    loop = close(net, model, faults, sending)
+    plant = Plant(net, model, sending, faults)
+    assert compare(plant, loop) > 100
+    assert plant.things["breaks off R"] == {
+        None: "plant.R.breaks_off_nothing",
+        "r.grasp": "plant.R.breaks_off.r.grasp",
+    }
+    for name in ("R/still-done/r.grasp", "R/still-accident/r.grasp", "R/done/r.rest", "R/done/r.brake"):
+        for t in by_happening(plant, loop.net.transitions)[name]:
+            others = [one for one in by_happening(plant, loop.net.transitions)[name] if one is not t]
+            with pytest.raises(DiffersError, match="does not go as the plant file says"):
+                compare_one(plant, name, others)
 
 
 # --------------------------------------------------------------------------------------------------------------------

@@ -55,8 +55,8 @@ def model(text: str = TEXT) -> PlantModel:
 class Bench:
     """A plant with a clock; commands run to their end unless told otherwise."""
 
-    def __init__(self, *disturbances: Disturbance, workpieces: int = 2, text: str = TEXT) -> None:
-        self.plant = Plant(model(text), workpieces=workpieces, disturbances=disturbances)
+    def __init__(self, *disturbances: Disturbance, workpieces: int = 2, text: str = TEXT, seed: int = 0) -> None:
+        self.plant = Plant(model(text), workpieces=workpieces, seed=seed, disturbances=disturbances)
         self.now = 0.0
         self.reports: list[PlantReport] = self.plant.advance(0.0)
         self.tickets = 0
@@ -213,10 +213,10 @@ STOPPABLE = TEXT.replace("      GRASP:", "      STOP:  {does: stop, takes_s: 0.5
 )
 
 
-def test_stop_that_takes_time_leaves_a_command_undone_at_once_and_is_done_at_rest() -> None:
+def test_stop_that_takes_time_is_done_at_rest_and_what_was_not_near_its_end_is_left_undone() -> None:
     bench = Bench(text=STOPPABLE)
     bench.give("R", "MOVE", to="ENTRY")
-    bench.wait(1.75)
+    bench.wait(0.5)
     assert bench.give("R", "STOP") == []
     assert bench.wait(0.25) == []
     assert bench.give("R", "STOP") == []
@@ -226,6 +226,37 @@ def test_stop_that_takes_time_leaves_a_command_undone_at_once_and_is_done_at_res
     assert bench.wait(1.75) == []
     assert bench.wait(0.25) == [SensorChanged("key", value=True)]
     assert bench.do("R", "MOVE", to="ENTRY") == [SensorChanged("key", value=False), CommandDone(4)]
+
+
+def test_what_a_stop_breaks_off_near_its_end_may_still_be_done_before_the_machine_rests_and_no_one_is_told() -> None:
+    seen = set()
+    for seed in range(20):
+        bench = Bench(text=STOPPABLE, workpieces=1, seed=seed)
+        bench.do("R", "MOVE", to="ENTRY")
+        bench.give("R", "GRASP", at="ENTRY")
+        bench.wait(0.75)
+        assert bench.give("R", "STOP") == []
+        bench.wait(0.125)
+        assert bench.give("R", "STOP") == []
+        assert bench.wait(0.375) in ([], [SensorChanged("entry", value=False), SensorChanged("hand", value=True)])
+        seen.add(bench.plant.machines["R"].holding is not None)
+        assert bench.wait(0.125) == [CommandDone(4)]
+        holding = bench.plant.machines["R"].holding
+        bench.wait(3)
+        assert bench.plant.machines["R"].holding is holding, "what is at rest does nothing"
+    assert seen == {True, False}
+
+
+def test_what_a_stop_breaks_off_may_still_end_in_its_accident() -> None:
+    seen = set()
+    for seed in range(20):
+        bench = Bench(text=STOPPABLE, workpieces=0, seed=seed)
+        bench.do("R", "MOVE", to="ENTRY")
+        bench.give("R", "GRASP", at="ENTRY")
+        bench.wait(0.75)
+        bench.do("R", "STOP")
+        seen.add(tuple(bench.faults))
+    assert seen == {(), ("R: R grasps at ENTRY, where no workpiece lies",)}
 
 
 def test_nobody_comes_to_a_machine_that_is_stopped_at_rest_and_a_machine_that_stops_takes_nothing_else() -> None:
@@ -240,10 +271,11 @@ def test_nobody_comes_to_a_machine_that_is_stopped_at_rest_and_a_machine_that_st
 
 
 @pytest.mark.parametrize("text", [STOPPABLE, STOPPABLE.replace("stop, takes_s: 0.5", "stop")])
-def test_stop_that_hangs_leaves_the_command_undone_and_is_never_done(text: str) -> None:
+def test_stop_that_hangs_is_never_done(text: str) -> None:
     bench = Bench(NeverCompletes("R", "STOP"), text=text)
     bench.give("R", "MOVE", to="ENTRY")
-    assert bench.do("R", "STOP") == []
+    assert bench.give("R", "STOP") == []
+    assert bench.wait(1) == []
     assert bench.plant.machines["R"].position == "HOME"
     assert [what for _, what in bench.plant.befallen] == ["R has STOP and will never end it"]
     assert bench.do("R", "STOP") == [CommandDone(3), SensorChanged("key", value=True)]
