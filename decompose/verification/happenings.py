@@ -170,8 +170,6 @@ class Plant(Things):
             if isinstance(self.action(was), Stop):
                 changes |= {breaks: None} if place.name in self.stops else {}
             elif was in self.broken_off(name) and place.name not in self.stops:
-                if state[breaks] is not None:
-                    return  # a machine that is at a command has broken off none
                 changes |= {breaks: was.name}
         yield changes
 

@@ -23,7 +23,7 @@ from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.documents import ShownRecord, checked_document
 from firable.decompose.verification.happenings import Plant
 from firable.decompose.verification.loop_questions import Asked, Question
-from firable.decompose.verification.plant import DiffersError
+from firable.decompose.verification.plant import DiffersError, UncomparedError
 from firable.decompose.verification.recut import Cut
 from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.same_loop import compare
@@ -113,6 +113,9 @@ class _Judging:
             compare(plant, loop)
         except DiffersError as error:
             message = f"the loop with '{PLANT}' is not what that says: {error}"
+            raise NotShownError(message, "evidence", PLANT) from None
+        except UncomparedError as error:
+            message = f"it cannot be seen here whether the loop with '{PLANT}' is what that says: {error}"
             raise NotShownError(message, "evidence", PLANT) from None
         except InputError as error:
             raise _closes_nothing(error) from None

@@ -37,6 +37,10 @@ class DiffersError(Exception):
     """The net of the loop is not what the plant file says, and where."""
 
 
+class UncomparedError(Exception):
+    """Whether the net of the loop is what the plant file says would have to be asked in too many states."""
+
+
 @dataclass(frozen=True)
 class Things:
     """A net with the machines of a plant file; each thing has a name here, and a value in each state.
@@ -87,13 +91,13 @@ class Things:
         return found | {ACCIDENT: {True: "plant.accident"}, OVERRUN: {True: "plant.overrun"}}
 
     @cached_property
-    def thing_of(self) -> dict[str, str]:
-        """The thing that each place of the loop is of; raises `DiffersError` where one is of two."""
-        found: dict[str, str] = {}
+    def thing_of(self) -> dict[str, tuple[str, Value]]:
+        """The thing that each place of the loop is of, and its value; raises `DiffersError` where one is of two."""
+        found: dict[str, tuple[str, Value]] = {}
         for thing, places in self.things.items():
-            for place in places.values():
-                if found.setdefault(place, thing) != thing:
-                    raise DiffersError(f"'{place}' stands for the {found[place]}, and for the {thing}")
+            for value, place in places.items():
+                if found.setdefault(place, (thing, value))[0] != thing:
+                    raise DiffersError(f"'{place}' stands for the {found[place][0]}, and for the {thing}")
         return found
 
     def values(self, thing: str) -> list[Value]:
@@ -103,6 +107,32 @@ class Things:
             return [False, True]
         never = self.stops if thing.startswith("at ") else ()
         return [value for value in places if value not in never]
+
+    # --- What there can be
+
+    def ways_to_know(self, thing: str, state: State) -> list[dict[str, Value]]:
+        """The values that a thing may have in a state in which it is left open, each with those of what it goes by."""
+        if not thing.startswith("breaks off "):
+            return [{thing: value} for value in self.values(thing)]
+        at = thing.replace("breaks off ", "at ", 1)
+        return [
+            {at: now_at, thing: value}
+            for now_at in ([state[at]] if at in state else self.values(at))
+            for value in (self.values(thing) if self.comes_to_rest(now_at) else [None])
+        ]
+
+    def assert_exists(self, state: State, changes: Mapping[str, Value]) -> None:
+        """After changes nothing is broken off but by a machine at a stop; raises `DiffersError`."""
+        for machine in self.model.machines:
+            at, breaks = f"at {machine}", f"breaks off {machine}"
+            if breaks not in self.things or changes.keys().isdisjoint((at, breaks)):
+                continue
+            if state[breaks] is not None and not self.comes_to_rest(state[at]):
+                raise DiffersError(f"{machine} breaks off the command of '{state[breaks]}', and is at no stop")
+
+    def comes_to_rest(self, at: Value) -> bool:
+        """Whether a machine that is at the command of a place comes to rest."""
+        return at is not None and isinstance(self.action(self.net.place(str(at))), Stop)
 
     @cached_property
     def start(self) -> State:

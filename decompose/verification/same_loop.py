@@ -4,17 +4,18 @@ For each thing that can happen the net has transitions, and the second reading (
 asked in every state of the things that either of them looks at, and must lead to the same states. Since each thing has
 one value at the start, and what happens gives it one, by induction the loop and the reading have the same runs.
 Nothing is explored, so the size of the loop does not matter; what one happening looks at is a dozen things at most.
+
+States that cannot be are left out where `Things` says so: nothing is broken off but by a machine at a stop. It is so at
+the start, and each happening is seen to leave it so.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import product
-from math import prod
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from firable.decompose.verification.happenings import Plant
-from firable.decompose.verification.plant import ACCIDENT, OVERRUN, DiffersError, Value
+from firable.decompose.verification.plant import ACCIDENT, OVERRUN, DiffersError, UncomparedError, Value
 from firable.nets.machines.loop import ClosedLoop, Sending
 from firable.nets.net import Transition
 
@@ -72,73 +73,83 @@ def _compare_names(plant: Plant, loop: ClosedLoop) -> None:
 
 
 class _UnseenError(Exception):
-    """The second reading looks at a thing that the net does not."""
+    """Something looks at a thing whose value is left open."""
 
 
 class _State(dict[str, Value]):
-    """The values of some things; looking at another one, by its name in brackets, is told."""
+    """The values of some things; looking at another one is told, by its name."""
 
     def __missing__(self, thing: str) -> Value:
         raise _UnseenError(thing)
 
 
 def compare_one(plant: Plant, name: str, transitions: Sequence[Transition]) -> int:
-    """In how many states the transitions of one happening were compared; raises `DiffersError`."""
+    """In how many states the transitions of one happening were compared; raises `DiffersError`.
+
+    A state has the values of as many things as are looked at in it, and stands for all that have them: only where the
+    reading, or a transition, looks at one more is there a state for each of its values. Where a transition lacks its
+    first token nobody looks at machines, so there are sums of states and not products.
+    """
     ended = {plant.things[thing][True] for thing in (ACCIDENT, OVERRUN)}
     for t in transitions:
         if not ended <= {*t.outputs, *t.inhibitive}:
             raise DiffersError(f"'{t.name}' may happen after an accident")
-    touched = (place for t in transitions for place in (*t.inputs, *t.outputs, *t.permissive, *t.inhibitive))
-    things = dict.fromkeys(plant.thing_of[place] for place in touched) | dict.fromkeys((ACCIDENT, OVERRUN))
-    ways = [_Way.of(t) for t in transitions]
-    while True:
+    ways, count = [_Way.of(t) for t in transitions], 0
+    open_ = [_State({ACCIDENT: False, OVERRUN: False})]
+    while open_:
+        state = open_.pop()
         try:
-            return sum(_same_in(plant, name, ways, state) for state in _states(plant, things, name))
+            _compare_in(plant, name, ways, state)
         except _UnseenError as error:
-            things[str(error)] = None
+            open_ += (_State({**state, **more}) for more in plant.ways_to_know(str(error), state))
+            continue
+        if (count := count + 1) > STATES_MAX:
+            raise UncomparedError(f"'{name}' looks at more things than are compared")
+    return count
 
 
 class _Way(NamedTuple):
     """The places of a transition: those that must be full, those that must be empty, and what it takes and fills."""
 
-    full: frozenset[str]
-    empty: frozenset[str]
+    full: tuple[str, ...]
+    empty: tuple[str, ...]
     takes: frozenset[str]
     fills: frozenset[str]
 
     @classmethod
     def of(cls, t: Transition) -> _Way:
-        takes, fills = frozenset(t.inputs), frozenset(t.outputs)
-        return cls(takes.union(t.permissive), fills.union(t.inhibitive), takes, fills)
+        full, empty = (*t.inputs, *t.permissive), (*t.outputs, *t.inhibitive)
+        return cls(full, empty, frozenset(t.inputs), frozenset(t.outputs))
+
+    def firable(self, plant: Plant, state: _State) -> bool:
+        """Whether it is, as far as is known: raises `_UnseenError` where that lies at something left open."""
+        unseen = ""
+        for places, wanted in ((self.full, True), (self.empty, False)):
+            for place in places:
+                thing, value = plant.thing_of[place]
+                if thing not in state:
+                    unseen = unseen or thing
+                elif (state[thing] == value) != wanted:
+                    return False
+        if unseen:
+            raise _UnseenError(unseen)
+        return True
 
 
-def _states(plant: Plant, things: Iterable[str], name: str) -> Iterator[_State]:
-    """Every state of these things before an accident."""
-    among: dict[str, list[Value]] = {
-        thing: [False] if thing in {ACCIDENT, OVERRUN} else plant.values(thing) for thing in things
-    }
-    if prod(map(len, among.values())) > STATES_MAX:
-        raise DiffersError(f"'{name}' looks at more things than are compared")
-    yield from (_State(zip(among, values, strict=True)) for values in product(*among.values()))
-
-
-def _same_in(plant: Plant, name: str, ways: Iterable[_Way], state: _State) -> bool:
-    said = {_marked(plant, {**state, **_known(changes, state)}) for changes in plant.happenings[name](state)}
+def _compare_in(plant: Plant, name: str, ways: Iterable[_Way], state: _State) -> None:
+    changes = list(plant.happenings[name](state))
+    firable = [way for way in ways if way.firable(plant, state)]
+    for one in changes:
+        for thing in one:
+            _ = state[thing]
+        plant.assert_exists(_State({**state, **one}), one)
     marked = _marked(plant, state)
-    firable = (way for way in ways if way.full <= marked and way.empty.isdisjoint(marked))
-    if said != {marked - way.takes | way.fills for way in firable}:
+    if {_marked(plant, {**state, **one}) for one in changes} != {marked - way.takes | way.fills for way in firable}:
         told = ", ".join(f"{thing}: {value}" for thing, value in state.items() if value)
         raise DiffersError(f"'{name}' does not go as the plant file says, where {told or 'nothing is so'}")
-    return True
-
-
-def _known(changes: dict[str, Value], state: dict[str, Value]) -> dict[str, Value]:
-    if unseen := next((thing for thing in changes if thing not in state), None):
-        raise _UnseenError(unseen)
-    return changes
 
 
 def _marked(plant: Plant, state: Mapping[str, Value]) -> frozenset[str]:
-    """The places that are marked in a state."""
+    """The places of the things in a state that are marked in it."""
     things = plant.things
     return frozenset([things[thing][value] for thing, value in state.items() if value in things[thing]])

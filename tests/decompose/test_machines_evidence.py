@@ -15,7 +15,7 @@ from firable.analysis.goal import Limits
 from firable.decompose.bundling import make_bundle
 from firable.decompose.proofs.closed_loops import sealed_loops
 from firable.decompose.splitting.cut import split
-from firable.decompose.verification import machines
+from firable.decompose.verification import machines, same_loop
 from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.checking import check_bundle
 from firable.decompose.verification.documents import ShownRecord, checked_document
@@ -187,6 +187,14 @@ def test_a_loop_that_is_not_what_the_plant_file_says_is_refused(monkeypatch: pyt
     monkeypatch.setattr(Laws, "spoiled", lambda *_: iter(()))
     with pytest.raises(
         InputError, match=r"the loop with 'plant\.yaml' is not what that says: .* as the plant file says"
+    ):
+        check_bundle(bundled())
+
+
+def test_a_loop_too_large_to_be_compared_is_no_mistake_of_the_bundle(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(same_loop, "STATES_MAX", 10)
+    with pytest.raises(
+        InputError, match=r"it cannot be seen here whether the loop with 'plant\.yaml' is what that says"
     ):
         check_bundle(bundled())
 

@@ -10,8 +10,9 @@ from typing import Any
 
 import pytest
 
+from firable.decompose.verification import same_loop
 from firable.decompose.verification.happenings import Plant
-from firable.decompose.verification.plant import DiffersError
+from firable.decompose.verification.plant import DiffersError, UncomparedError
 from firable.decompose.verification.same_loop import by_happening, compare, compare_one
 from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.diagnostics import InputError
@@ -58,7 +59,7 @@ def test_the_loop_of_every_cell_of_the_catalogue_is_what_its_plant_file_says(
     name: str, sending: Sending, faults: Faults
 ) -> None:
     net, model, loop = closed(name, sending, faults)
-    assert compare(Plant(net, model, sending, faults), loop) > 1000
+    assert compare(Plant(net, model, sending, faults), loop) > 3 * len(loop.net.transitions)
 
 
 OTHER_COMMANDS = ({"does": "stop"}, {"does": "stop", "takes_s": 1.0}, {"does": "work", "takes_s": 1.0})
@@ -96,7 +97,7 @@ def test_both_readings_agree_on_plants_of_every_kind() -> None:
         except InputError:
             continue  # a net that the plant does not fit
         count += 1
-        assert compare(Plant(net, model, sending, faults), loop) > 1000
+        assert compare(Plant(net, model, sending, faults), loop) > 3 * len(loop.net.transitions)
     assert count > 10
 
 
@@ -145,7 +146,7 @@ def test_both_readings_agree_on_stops_at_once_and_in_time_of_one_machine(sending
     net, model = parse_net(STOPS), parse_plant(STOPS_PLANT)
     loop = close(net, model, faults, sending)
     plant = Plant(net, model, sending, faults)
-    assert compare(plant, loop) > 100
+    assert compare(plant, loop) > 2 * len(loop.net.transitions)
     assert plant.things["breaks off R"] == {
         None: "plant.R.breaks_off_nothing",
         "r.grasp": "plant.R.breaks_off.r.grasp",
@@ -155,6 +156,93 @@ def test_both_readings_agree_on_stops_at_once_and_in_time_of_one_machine(sending
             others = [one for one in by_happening(plant, loop.net.transitions)[name] if one is not t]
             with pytest.raises(DiffersError, match="does not go as the plant file says"):
                 compare_one(plant, name, others)
+
+
+def two_machines(count: int) -> tuple[Net, PlantModel]:
+    """Two hands with so many motions each, stopped in one firing."""
+    cell, plant = "firable: 1\ncell: two\ncontrollers:\n", "firable_plant: 1\nplant: two\nstations: [s]\n"
+    transitions = "transitions:\n  both: {from: [a.halt, b.halt], to: [a.idle, b.idle]}\n"
+    last = f"m{count - 1}"
+    transitions += f"  stop: {{from: [a.{last}, b.{last}], to: [a.halt, b.halt]}}\n"
+    plant += "arrivals: {station: s, every_s: 5}\ndepartures: {station: s, after_s: 3}\nsensors: {}\nmachines:\n"
+    for name, machine in (("a", "A"), ("b", "B")):
+        cell += f"  {name}:\n    start: idle\n    places:\n      idle:\n"
+        cell += f"      halt: {{send: {{machine: {machine}, command: STOP}}, until: at_rest}}\n"
+        before = "idle"
+        for i in range(count):
+            cell += f"      m{i}: {{send: {{machine: {machine}, command: MOVE, to: P}}, until: done{i}}}\n"
+            transitions += f"  {name}{i}: {{from: {name}.{before}, to: {name}.m{i}}}\n"
+            before = f"m{i}"
+        plant += f"  {machine}: {{hand: P, positions: {{P: s}}, commands: {{MOVE: {{does: move, takes_s: 1}},"
+        plant += " STOP: {does: stop}}}\n"
+    return parse_net(cell + transitions), parse_plant(plant)
+
+
+def test_a_firing_that_stops_two_machines_is_compared_however_many_commands_they_have() -> None:
+    net, model = two_machines(20)
+    loop = close(net, model, sending=Sending.AT_ONCE)
+    plant = Plant(net, model, Sending.AT_ONCE)
+    stopping = by_happening(plant, loop.net.transitions)["stop"]
+    assert len(stopping) > 20**2
+    assert compare_one(plant, "stop", stopping) < 4 * len(stopping)
+
+
+def test_a_gate_on_what_the_reading_does_not_look_at_is_refused() -> None:
+    net, model, loop = closed("one_robot")
+    plant, seen = Plant(net, model), 0
+    for name, some in by_happening(plant, loop.net.transitions).items():
+        if len(some) != 1:
+            continue  # in what is no longer done in one way another may do the same
+        (t,) = some
+        for place in ("plant.MC.idle", "plant.R.hand_at.CV1", "plant.CV1.at.conveyor.cv1_run"):
+            if place in (*t.inputs, *t.outputs, *t.permissive, *t.inhibitive):
+                continue
+            for gated in (
+                replace(t, permissive=(*t.permissive, place)),
+                replace(t, inhibitive=(*t.inhibitive, place)),
+            ):
+                with pytest.raises(DiffersError, match="does not go as the plant file says"):
+                    compare_one(plant, name, [gated])
+                seen += 1
+    assert seen > 100
+
+
+def test_what_the_reading_ends_and_the_net_does_not_look_at_is_a_difference(monkeypatch: pytest.MonkeyPatch) -> None:
+    net, model, loop = closed("one_robot")
+    arrives = Plant.arrives
+    monkeypatch.setattr(
+        Plant, "arrives", lambda self, state: ({**one, "signal robot.at_cv1": False} for one in arrives(self, state))
+    )
+    plant, name = Plant(net, model), f"arrives/{model.arrivals.station}"
+    with pytest.raises(DiffersError, match=f"'{name}' does not go as the plant file says"):
+        compare_one(plant, name, by_happening(plant, loop.net.transitions)[name])
+
+
+def test_what_is_broken_off_after_a_stop_is_found_where_both_readings_forget_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """No state is compared in which a machine at rest breaks something off: so none may come about."""
+    net, model, done = parse_net(STOPS), parse_plant(STOPS_PLANT), Plant.done
+    monkeypatch.setattr(Laws, "_at_rest", lambda *_: iter([Case()]))
+    monkeypatch.setattr(
+        Plant,
+        "done",
+        lambda self, place, state: (
+            {thing: value for thing, value in one.items() if not thing.startswith("breaks off")}
+            for one in done(self, place, state)
+        ),
+    )
+    plant, name = Plant(net, model, Sending.AT_ONCE), "R/done/r.rest"
+    some = by_happening(plant, close(net, model, sending=Sending.AT_ONCE).net.transitions)[name]
+    with pytest.raises(DiffersError, match=r"R breaks off the command of 'r\.grasp', and is at no stop"):
+        compare_one(plant, name, some)
+
+
+def test_what_would_be_asked_in_too_many_states_is_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
+    net, model, loop = closed("one_robot")
+    monkeypatch.setattr(same_loop, "STATES_MAX", 10)
+    with pytest.raises(UncomparedError, match="looks at more things than are compared"):
+        compare(Plant(net, model), loop)
 
 
 # --------------------------------------------------------------------------------------------------------------------
