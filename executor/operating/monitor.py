@@ -11,9 +11,10 @@ states as there are sets of markings, of which a run meets few.
 themselves (`watched_loop.py`). A signal is taken later than it changed: on the way lie a driver, a link, a promise that
 latches it. So what a signal is and what was taken of it may differ for `latency_seconds`, and no longer.
 
-*Absence* is seen too, because a plant file has times: a command is done at the latest after its time, its jitter and
-the latency, but for one that waits until its place is free. A marking of the belief in which the machine is still at it
-is then dropped, as one whose signal should have been taken by now; what is left, if anything, explains the silence.
+*Absence* is seen too, because a plant file has times: a command is done at the latest after its time and its jitter, or
+when the station that it waits for has become free, and seen to be after the latency. A marking of the belief in which
+the machine is still at it is then dropped, as one whose signal should have been taken by now; what is left, if
+anything, explains the silence.
 
 The first divergence is the last: a model that the cell has left says nothing of what follows. Rejected: a twin, the
 simulated cell run beside the real one. It has one history where the belief has all, so it needs a tolerance for every
@@ -29,7 +30,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from firable.executor.operating.watched_loop import REMEMBERED, Move, WatchedLoop
+from firable.executor.operating.watched_loop import REMEMBERED, Move, WatchedLoop, Work
 from firable.nets.machines.plant_file import PlantModel
 from firable.nets.net import Marking, Net
 from firable.semantics.trace import CommandSent, Event, Fired, Noted, SignalChanged, Trace
@@ -75,11 +76,12 @@ class _Demand:
     subject: str
 
 
-_Demanded = tuple[list[tuple[str, float, str | None]], list[tuple[int, str]]]
-"""The commands that must be done, each with how long it may take and its completion; the signals that must be taken."""
+_Demanded = tuple[list[tuple[str, Work]], list[tuple[int, str]]]
+"""The commands that must be done, by their places; the signals that must be taken."""
 
 _Belief = dict[Marking, tuple[float, ...]]
-"""Each marking of the loop with, for each signal, when it last changed there without having been taken since."""
+"""Each marking of the loop with, for each place in `WatchedLoop.timed`, when it last changed there; a signal, without
+having been taken since."""
 
 
 class Monitor:
@@ -112,7 +114,7 @@ class Monitor:
         self.marking = net.initial_marking
         self.divergence: Divergence | None = None
         """The first divergence; after it nothing is watched."""
-        self.belief = self._closed({self.loop.initial: (_NEVER,) * len(self.signals)}, 0.0)
+        self.belief = self._closed({self.loop.initial: (_NEVER,) * len(self.loop.timed)}, 0.0)
 
     def seen(self, event: Event) -> Divergence | None:
         """An event of a trace; the divergence that it shows, if it is the first."""
@@ -229,7 +231,7 @@ class Monitor:
         self, marking: Marking, since: tuple[float, ...], move: Move, at_seconds: float
     ) -> tuple[Marking, tuple[float, ...]]:
         stamps = since
-        for s in self.loop.shown_by(move):
+        for s in self.loop.timed_by(move):
             stamps = (*stamps[:s], at_seconds, *stamps[s + 1 :])
         return marking ^ move.flips, stamps
 
@@ -244,9 +246,12 @@ class Monitor:
     def _demands(self, marking: Marking, since: tuple[float, ...]) -> Iterator[_Demand]:
         """What must have happened by when, if the loop is in this marking."""
         works, signals = self._demanded(marking)
-        for place, longest_seconds, completion in works:
-            begun = self.sent_seconds.get(place, 0.0) + longest_seconds
-            yield _Demand(self._excused(begun, completion) + self.latency_seconds, place)
+        for place, work in works:
+            over = self.sent_seconds.get(place, 0.0) + work.longest_seconds
+            if work.waits_while_empty:
+                over = max(over, since[self.loop.timed.index(work.waits_while_empty)])
+            completion = self.net.place(place).completion
+            yield _Demand(self._excused(over, completion) + self.latency_seconds, place)
         for s, name in signals:
             yield _Demand(self._excused(since[s], name) + self.latency_seconds, name)
 
@@ -256,7 +261,7 @@ class Monitor:
         if (known := self.demanded_in.get(key)) is not None:
             return known
         works = [
-            (place, work.longest_seconds, self.net.place(place).completion)
+            (place, work)
             for place, work in self.loop.work.items()
             if marking & work.busy and not (work.waits_while_empty and not marking & work.waits_while_empty)
         ]
@@ -285,10 +290,12 @@ class Monitor:
         if name not in self.loop.work:
             taken = int(self.taken[self.signals.index(name)])
             return name, f"'{name}' must be {1 - taken} by now, and is still {taken}", self._waiting_for(name)
-        message = (
-            f"'{self.net.place(name).command}', sent at {self.sent_seconds.get(name, 0.0):.1f} s, must be done after "
-            f"{self.loop.work[name].longest_seconds:g} s at the latest, and nothing shows that it is"
-        )
+        work = self.loop.work[name]
+        latest = f"after {work.longest_seconds:g} s at the latest"
+        if work.waits_while_empty:
+            latest += ", or when the station that it waits for is free"
+        sent = f"'{self.net.place(name).command}', sent at {self.sent_seconds.get(name, 0.0):.1f} s"
+        message = f"{sent}, must be done {latest}, and nothing shows that it is"
         return name, message, (name,)
 
     def _waiting_for(self, signal: str) -> tuple[str, ...]:

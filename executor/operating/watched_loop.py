@@ -87,8 +87,11 @@ class WatchedLoop:
         self.shown = tuple((self._bit(place), means) for place, means in map(loop.shown.__getitem__, self.signals))
         """For each signal the place that says what it is, and the value that a token there means."""
         self.work = {place.name: self._work(laws, place.name, loop.at) for place in laws.commanding}
+        waited = dict.fromkeys(work.waits_while_empty for work in self.work.values() if work.waits_while_empty)
+        self.timed = (*(bit for bit, _ in self.shown), *waited)
+        """The places of which it is kept when they last changed: those of the signals, then those waited for."""
         self._hidden_in: dict[Marking, list[Move]] = {}
-        self._shown_by: dict[Marking, list[int]] = {}
+        self._timed_by: dict[Marking, list[int]] = {}
 
     def hidden_in(self, marking: Marking) -> list[Move]:
         """What may happen hidden in a marking."""
@@ -98,10 +101,10 @@ class WatchedLoop:
             moves = self._hidden_in[marking] = [move for move in self.hidden if move.firable(marking)]
         return moves
 
-    def shown_by(self, move: Move) -> list[int]:
-        """The indexes of the signals that a move changes."""
-        if (changed := self._shown_by.get(move.flips)) is None:
-            changed = self._shown_by[move.flips] = [s for s, (bit, _) in enumerate(self.shown) if move.flips & bit]
+    def timed_by(self, move: Move) -> list[int]:
+        """The indexes in `timed` of the places that a move changes."""
+        if (changed := self._timed_by.get(move.flips)) is None:
+            changed = self._timed_by[move.flips] = [i for i, bit in enumerate(self.timed) if move.flips & bit]
         return changed
 
     def _by_others(self, laws: Laws, station: str) -> Iterator[Move]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import io
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +20,9 @@ from firable.executor.operating.situation import State
 from firable.executor.protocol.commands import Answer
 from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.diagnostics import InputError
-from firable.semantics.trace import CommandSent, Event, SignalChanged, Trace
+from firable.nets.machines.plant_file import parse_plant
+from firable.nets.text import parse_net
+from firable.semantics.trace import CommandSent, Event, SignalChanged, Trace, parse_trace
 
 
 def watched(cell: str, trace: Trace) -> Divergence | None:
@@ -214,3 +217,56 @@ def test_machines_are_said_to_be_watched_no_more_when_a_run_goes_on_from_the_mid
     report, told = run(None)
     assert (report.watched, told) == (False, 1)
     assert run(None, Watch.IGNORE)[1] == 0
+
+
+BELT = """
+firable: 1
+cell: belt
+controllers:
+  b:
+    start: free
+    inputs: [there, full]
+    places:
+      free:
+      run:  {send: {machine: B, command: RUN}, until: done}
+      next: {send: {machine: B, command: RUN}, until: next_done}
+      seen:
+transitions:
+  go:   {from: b.free, to: b.run, if: b.there}
+  next: {from: b.run, to: b.next, if: b.there}
+  look: {from: b.next, to: b.seen, if: b.full}
+  end:  {from: b.seen, to: b.free}
+"""
+BELT_PLANT = """
+firable_plant: 1
+plant: belt
+stations: [table, exit]
+arrivals:   {station: table, every_s: 1}
+departures: {station: exit, after_s: 4}
+machines: {B: {commands: {RUN: {does: carry, from: table, to: exit, takes_s: 1, when_full: wait}}}}
+sensors:
+  b.there: {occupied: table}
+  b.full: {occupied: exit}
+"""
+
+
+def belt_run() -> Trace:
+    """A run in which each workpiece waits on the belt for 3 s, until the one before is taken away."""
+    stream = io.StringIO()
+    execute(split(parse_net(BELT)), parse_plant(BELT_PLANT), workpieces=4, trace=stream)
+    return parse_trace(stream.getvalue())
+
+
+def test_a_machine_that_has_waited_for_a_full_station_is_not_late_when_that_becomes_free() -> None:
+    assert watch(Monitor(parse_net(BELT), parse_plant(BELT_PLANT)), belt_run()) is None
+
+
+def test_a_machine_that_waits_although_the_station_is_free_is_noticed_after_the_latency() -> None:
+    monitor, events = Monitor(parse_net(BELT), parse_plant(BELT_PLANT)), belt_run().events
+    free = events.index(SignalChanged(5.0, "b.full", False))
+    assert all(monitor.seen(event) is None for event in events[: free + 1])
+    assert monitor.passed(5.4) is None
+    found = monitor.passed(7.0)
+    assert found is not None
+    assert found.subject in ("b.next", "b.full")
+    assert "b.next" in found.places
