@@ -67,7 +67,7 @@ class Plant(Things):
                 yield f"{self.machine_of(place)}/done/{place.name}", partial(self.done, place)
                 yield f"{self.machine_of(place)}/accident/{place.name}", partial(self.spoils, place)
         for name in self.model.machines:
-            for place in self.broken_off(name):
+            for place in self.may_break_off(name):
                 yield f"{name}/still-done/{place.name}", partial(self.still_done, place)
                 yield f"{name}/still-accident/{place.name}", partial(self.still_spoils, place)
         for place in self.failing:
@@ -169,7 +169,7 @@ class Plant(Things):
             was = self.net.place(str(state[at]))
             if isinstance(self.action(was), Stop):
                 changes |= {breaks: None} if place.name in self.stops else {}
-            elif was in self.broken_off(name) and place.name not in self.stops:
+            elif was in self.may_break_off(name) and place.name not in self.stops:
                 changes |= {breaks: was.name}
         yield changes
 

@@ -73,9 +73,9 @@ class Things:
             at: dict[Value, str] = {None: f"plant.{name}.idle"}
             at |= {p.name: f"plant.{name}.at.{p.name}" for p in self.commanding if self.machine_of(p) == name}
             found[f"at {name}"] = at
-            if self.broken_off(name):
+            if self.may_break_off(name):
                 breaks: dict[Value, str] = {None: f"plant.{name}.breaks_off_nothing"}
-                breaks |= {p.name: f"plant.{name}.breaks_off.{p.name}" for p in self.broken_off(name)}
+                breaks |= {p.name: f"plant.{name}.breaks_off.{p.name}" for p in self.may_break_off(name)}
                 found[f"breaks off {name}"] = breaks
             if machine.hand is not None:
                 hands: dict[Value, str] = {where: f"plant.{name}.hand_at.{where}" for where in machine.positions}
@@ -152,7 +152,7 @@ class Things:
         some = ((place, self.action(place)) for place in self.commanding if place.completion is None)
         return {place.name for place, one in some if isinstance(one, Stop) and not one.takes_s and not one.jitter_s}
 
-    def broken_off(self, machine: str) -> list[Place]:
+    def may_break_off(self, machine: str) -> list[Place]:
         """Those whose command a stop of the machine may break off: not that of a stop, nor one that does nothing; none
         where the machine is always stopped at once."""
         own = [place for place in self.commanding if self.machine_of(place) == machine]

@@ -14,6 +14,7 @@ import random
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from heapq import heappop, heappush
+from typing import Final
 
 from firable.executor.cell.disturbances import Disturbance, Disturbances, StuckSensor
 from firable.nets.machines.plant_file import (
@@ -30,6 +31,9 @@ from firable.nets.machines.plant_file import (
     Sensor,
     Stop,
 )
+
+STILL_DONE: Final = 0.5
+"""How often a machine that is brought to rest in some time does what it would have been done with by then."""
 
 Ticket = int
 """Names one sent command in the plant's answer."""
@@ -77,8 +81,7 @@ class _Busy:
     parameters: Mapping[str, str]
     ticket: Ticket
     waits: bool = False
-    breaks_off: _Busy | None = None
-    """Of a stop, the command that the machine was at when it came."""
+    """Whether it would be done if its station were not full."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +127,8 @@ class _MachineNow:
     position: str | None
     holding: Workpiece | None = None
     busy: _Busy | None = None
+    breaks_off: _Busy | None = None
+    """The command that it was at when it was stopped, until it has come to rest."""
     times: dict[str, int] = field(default_factory=dict)
 
 
@@ -181,12 +186,12 @@ class Plant:
     def halt(self) -> None:
         """Stop every machine where it is: the safe output of the simulated cell."""
         self.faulted = True
-        for machine in self.machines.values():
-            machine.busy = None
+        for machine in self.machines:
+            self.stand(machine)
 
     def stand(self, machine: str) -> None:
         """Stop one machine where it is; what it was at is never done, and it may be commanded again."""
-        self.machines[machine].busy = None
+        self.machines[machine].busy = self.machines[machine].breaks_off = None
 
     def command(
         self, now_seconds: float, machine: str, command: str, parameters: Mapping[str, str], ticket: Ticket
@@ -228,11 +233,12 @@ class Plant:
             case _Departure():
                 self._depart()
             case _Finish(machine, busy):
-                at = self.machines[machine].busy
-                if at is busy:
+                now = self.machines[machine]
+                if now.busy is busy:
                     yield from self._finish(machine, busy)
-                elif at is not None and at.breaks_off is busy and self.random.random() < 0.5:
-                    self._take_effect(machine, busy)  # the machine was so near the end that it is done before it rests
+                elif now.breaks_off is busy and self.random.random() < STILL_DONE:
+                    waits = not self._take_effect(machine, busy)
+                    now.breaks_off = replace(busy, waits=waits)
             case _Press(signal):
                 if self.machines[str(self.model.sensors[signal].acknowledges)].busy is None:
                     self.pressed.add(signal)
@@ -271,7 +277,9 @@ class Plant:
             raise _FaultError(f"{name} does not know the command {busy.command}")
         machine.times[busy.command] = machine.times.get(busy.command, 0) + 1
         if isinstance(action, Stop):
-            machine.busy = busy = replace(busy, breaks_off=self._to_break_off(machine))
+            if machine.busy is not None and not isinstance(machine.model.commands[machine.busy.command], Stop):
+                machine.breaks_off = machine.busy
+            machine.busy = busy
             if action.takes_s + action.jitter_s or self._hangs(name, busy):
                 self._take_time(name, busy, action)
             else:
@@ -312,23 +320,18 @@ class Plant:
     def _hangs(self, name: str, busy: _Busy) -> Disturbance | None:
         return self.disturbances.hangs(name, busy.command, self.machines[name].times[busy.command])
 
-    def _to_break_off(self, machine: _MachineNow) -> _Busy | None:
-        """What a stop would break off; at a stop that is not over yet, what that one has."""
-        at = machine.busy
-        return at.breaks_off if at is not None and isinstance(machine.model.commands[at.command], Stop) else at
-
     def _finish(self, name: str, busy: _Busy) -> Iterator[PlantReport]:
         machine = self.machines[name]
         if not self._take_effect(name, busy):
             machine.busy = replace(busy, waits=True)
             return
-        machine.busy = None
-        for key, sensor in self._keys(name) if busy.breaks_off is not None else ():
+        for key, sensor in self._keys(name) if machine.breaks_off is not None else ():
             self._in(sensor.after_s, 0.0, _Press(key))
+        machine.busy = machine.breaks_off = None
         yield CommandDone(busy.ticket)
 
     def _take_effect(self, name: str, busy: _Busy) -> bool:
-        """Do what a command does in the end; False: the station is full, and the machine waits."""
+        """Do what a command does in the end, and say whether it is done: on a full station it may have to wait."""
         machine = self.machines[name]
         action = machine.model.commands[busy.command]
         match action:
@@ -384,8 +387,9 @@ class Plant:
     def _wake(self) -> None:
         """Let each machine that waits for a station to become free look again."""
         for name, machine in self.machines.items():
-            if machine.busy is not None and machine.busy.waits:
-                self._in(0.0, 0.0, _Finish(name, machine.busy))
+            for waiting in (machine.busy, machine.breaks_off):
+                if waiting is not None and waiting.waits:
+                    self._in(0.0, 0.0, _Finish(name, waiting))
 
     def _full(self, station: str | None) -> bool:
         return station is not None and self.stations[station] is not None

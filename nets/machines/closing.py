@@ -273,9 +273,9 @@ class _Closing:
                 failed = self.failed[name]
                 fails = Case((*working, *others), ((failed, True),))
                 yield from self.named(f"{name}/fails/{place.name}", f"{words} fails", each(start, [fails]))
-        for name, places in self.laws.broken_off.items():
+        for name, places in self.laws.may_break_off.items():
             for place in places:
-                yield from self.broken_off(name, place, start)
+                yield from self.still_moves(name, place, start)
         for name, failed in self.failed.items() if self.repaired else ():
             repair = Case(((failed, True),), ((failed, False),))
             yield from self.named(f"{name}/repaired", f"{name} is repaired and goes on", each(start, [repair]))
@@ -286,10 +286,10 @@ class _Closing:
         yield from self.workpieces(start)
         yield from self.unsteady(start)
 
-    def broken_off(self, name: str, place: Place, start: list[Moment]) -> Iterator[Transition]:
+    def still_moves(self, name: str, place: Place, start: list[Moment]) -> Iterator[Transition]:
         """What a machine breaks off may be done or end in its accident until it is at rest, unless it has failed."""
         works = Case(((self.failed[name], False),) if name in self.failed else ())
-        still = each(each(start, [works]), [self.laws.still(place)])
+        still = each(each(start, [works]), [self.laws.no_longer_broken_off(place)])
         done = chain.from_iterable(map(self.seen, each(still, self.laws.done(place))))
         words = f"{self.words(place)} is still done, before {name} has come to rest"
         yield from self.named(f"{name}/still-done/{place.name}", words, done)

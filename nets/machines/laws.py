@@ -100,7 +100,7 @@ class Laws:
         return f"{PLANT}.{machine}.idle"
 
     @cached_property
-    def broken_off(self) -> dict[str, tuple[Place, ...]]:
+    def may_break_off(self) -> dict[str, tuple[Place, ...]]:
         """For each machine that a stop brings to rest in some time, the places whose commands it breaks off: those that
         still do something when they are done."""
         found = {}
@@ -114,7 +114,7 @@ class Laws:
         """The place that says that the command of a place was broken off by a stop, and may still be done."""
         return f"{PLANT}.{_command(place).machine}.breaks_off.{place.name}"
 
-    def nothing_broken_off(self, machine: str) -> str:
+    def breaks_off_nothing(self, machine: str) -> str:
         """The place that says that nothing that was broken off at a machine may still be done."""
         return f"{PLANT}.{machine}.breaks_off_nothing"
 
@@ -149,8 +149,8 @@ class Laws:
             for place in self.commanding:
                 if _command(place).machine == name:
                     yield fact(self.busy(place), f"{name} is at {_words(place)}")
-            if broken_off := self.broken_off.get(name, ()):
-                yield fact(self.nothing_broken_off(name), f"{name} breaks off nothing", marked=True)
+            if broken_off := self.may_break_off.get(name, ()):
+                yield fact(self.breaks_off_nothing(name), f"{name} breaks off nothing", marked=True)
                 for place in broken_off:
                     words = f"{name} breaks off {_words(place)}, which may still be done"
                     yield fact(self.breaks_off(place), words)
@@ -222,29 +222,27 @@ class Laws:
     def _broken_off(self, place: Place) -> Case:
         """A machine that comes to rest in some time may still do what it was at."""
         name = self.machine(place)[0]
-        if place not in self.broken_off.get(name, ()):
+        if place not in self.may_break_off.get(name, ()):
             return self._undone(place)
-        leaves, wants = self._over(place)
-        return Case(wants, leaves, says=f"{name} breaks off {_words(place)}")
+        words = f"{name} breaks off {_words(place)}"
+        return Case(self._breaking_off(place, so=False), self._breaking_off(place, so=True), says=words)
+
+    def no_longer_broken_off(self, place: Place) -> Case:
+        """What a machine has broken off is over: it is done, spoiled, or left undone."""
+        return Case(self._breaking_off(place, so=True), self._breaking_off(place, so=False))
+
+    def _breaking_off(self, place: Place, *, so: bool) -> tuple[Literal, Literal]:
+        """What says that the command of a place is broken off, or that none is."""
+        return (self.breaks_off(place), so), (self.breaks_off_nothing(self.machine(place)[0]), not so)
 
     def _at_rest(self, name: str) -> Iterator[Case]:
         """A machine has come to rest: what was broken off is never done."""
-        if name not in self.broken_off:
+        if name not in self.may_break_off:
             yield Case()
             return
-        yield Case(((self.nothing_broken_off(name), True),))
-        for place in self.broken_off[name]:
-            yield Case(*self._over(place), f"undone-{place.name}", self._undone(place).says)
-
-    def _over(self, place: Place) -> tuple[tuple[Literal, ...], tuple[Literal, ...]]:
-        """What it wants and leaves that what was broken off no longer is."""
-        name = self.machine(place)[0]
-        wants = ((self.breaks_off(place), True), (self.nothing_broken_off(name), False))
-        return wants, tuple((fact, not value) for fact, value in wants)
-
-    def still(self, place: Place) -> Case:
-        """The machine does what it breaks off before it has come to rest: `done` or `spoiled` says what."""
-        return Case(*self._over(place))
+        yield Case(((self.breaks_off_nothing(name), True),))
+        for place in self.may_break_off[name]:
+            yield self.no_longer_broken_off(place).with_(self._undone(place)).with_(Case(tag=f"undone-{place.name}"))
 
     def refused(self, place: Place) -> Iterator[Case]:
         """The accidents that sending the command of a place can be: each wants that none before it happens."""

@@ -33,8 +33,10 @@ class Case:
     says: str = ""
 
     def with_(self, other: Case) -> Case:
-        """This case and one of other places, as one."""
-        tag, says = "-".join(filter(None, (self.tag, other.tag))), "; ".join(filter(None, (self.says, other.says)))
+        """This case and one of other places, as one; raises `ValueError` where a place is wanted by both."""
+        if not {place for place, _ in self.wants}.isdisjoint(place for place, _ in other.wants):
+            raise ValueError("two cases that are put together want something of one place")
+        tag, says = "/".join(filter(None, (self.tag, other.tag))), "; ".join(filter(None, (self.says, other.says)))
         return Case((*self.wants, *other.wants), (*self.leaves, *other.leaves), tag, says)
 
 

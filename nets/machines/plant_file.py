@@ -128,7 +128,8 @@ class Work(_Timed):
 class Stop(_Model):
     """Stop whatever the machine does; at once, or, with `takes_s`, as long as it takes to come to rest.
 
-    At once what it was at is left undone; else it may still be done before the machine has come to rest.
+    At once what it was at is left undone; else, and where a place waits for the end of the stop, it may still be done
+    before the machine has come to rest.
     """
 
     does: Literal["stop"]

@@ -259,6 +259,31 @@ def test_what_a_stop_breaks_off_may_still_end_in_its_accident() -> None:
     assert seen == {(), ("R: R grasps at ENTRY, where no workpiece lies",)}
 
 
+@pytest.mark.parametrize("stopped_after", [3.5, 4.5], ids=["before it waits", "while it waits"])
+def test_what_a_stop_breaks_off_at_a_full_station_may_still_be_done_when_that_becomes_free(
+    stopped_after: float,
+) -> None:
+    text = STOPPABLE.replace("takes_s: 4}", "takes_s: 4, when_full: wait}").replace(
+        "STOP: {does: stop}", "STOP: {does: stop, takes_s: 5}"
+    )
+    seen = set()
+    for seed in range(20):
+        bench = Bench(text=text, seed=seed)
+        bench.load()
+        bench.do("R", "MOVE", to="TABLE")
+        bench.give("B", "RUN")
+        bench.wait(stopped_after)
+        bench.give("B", "STOP")
+        bench.wait(1.5)
+        assert bench.plant.machines["B"].holding is not None
+        bench.give("R", "GRASP", at="TABLE")
+        bench.wait(1.25)
+        assert bench.faults == []
+        seen.add(bench.plant.stations["table"] is not None)
+        assert (bench.plant.stations["table"] is None) == (bench.plant.machines["B"].holding is not None)
+    assert seen == {True, False}
+
+
 def test_nobody_comes_to_a_machine_that_is_stopped_at_rest_and_a_machine_that_stops_takes_nothing_else() -> None:
     bench = Bench(text=STOPPABLE)
     bench.give("R", "STOP")

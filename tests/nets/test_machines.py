@@ -204,6 +204,13 @@ sensors:
 # --- The laws are those of the simulated cell
 
 
+class AlwaysInTime(random.Random):
+    """What a machine breaks off it is always so near the end of that it may still do it."""
+
+    def random(self) -> float:
+        return 0.0
+
+
 class Twin:
     """A loop and a simulated plant that are led through the same events."""
 
@@ -212,6 +219,7 @@ class Twin:
         self.player, self.marking = Player(self.loop.net), self.loop.net.initial_marking
         self.own = {variant: name for name, some in self.loop.variants.items() for variant in some}
         self.plant = Plant(model, workpieces=10_000)
+        self.plant.random = AlwaysInTime()
 
     def holds(self, place: str) -> bool:
         return bool(self.marking >> self.loop.net.place_index[place] & 1)
@@ -247,7 +255,8 @@ class Twin:
             return self.plant._lawful("", self.departing())
         if of in {"shown", "clears", "drops", "returns"}:
             return []
-        busy = self.plant.machines[what].busy
+        machine = self.plant.machines[what]
+        busy = machine.breaks_off if of.startswith("still-") else machine.busy
         assert isinstance(busy, Busy)
         return self.plant._lawful(what, self.plant._happen(Finish(what, busy)))
 
@@ -280,6 +289,11 @@ class Twin:
             if machine.busy is not None:
                 entered = self.net.places[machine.busy.ticket].name
                 assert self.holds(self.loop.at[entered])
+            broken_off = self.net.places[machine.breaks_off.ticket].name if machine.breaks_off is not None else ""
+            for place in self.net.places:
+                fact = f"plant.{name}.breaks_off.{place.name}"
+                # The simulated cell remembers what it broke off also when that is done after all.
+                assert fact not in self.loop.net.place_index or not self.holds(fact) or place.name == broken_off
             if machine.position is not None:
                 assert self.holds(f"plant.{name}.hand_at.{machine.position}")
         for station in ("table",):
