@@ -16,6 +16,7 @@ from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
 from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import Effect, Keep, Message
+from firable.executor.protocol.record import record
 from firable.executor.protocol.token_player import TokenPlayer, Word
 from firable.executor.simulation.numbering import (
     Collecting,
@@ -46,7 +47,7 @@ Job = tuple[str, int, Reached]
 """A command that was sent to a machine of the cell: its place, its entry, and how far it has come."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Budget:
     """How many faults of each kind a run may suffer."""
 
@@ -61,7 +62,7 @@ class Budget:
 NO_FAULTS: Final = Budget()
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Configuration:
     """Where everything stands; machines are numbers of `Explorer.machines`, in the order of `Explorer.names`."""
 
@@ -73,7 +74,7 @@ class Configuration:
     """The marking of the central net, and its signals, after what has fired and was taken in so far."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Step:
     """What happens: of which kind, in which machine, with what, and what the machine does; before and after it."""
 
@@ -126,6 +127,7 @@ class Repertoire:
         self.acts: dict[Hashable, tuple[int, tuple[Effect, ...]]] = {}
         self.found: dict[object, dict[Kind, set[int]]] = {}
         self.mentioned: dict[object, int] = {}
+        self.mentioned_in: dict[frozenset[Message] | frozenset[Job], frozenset[int]] = {}
         self.mentions: dict[Hashable, int] = {}
         self.rankings: dict[frozenset[int], Ranking] = {}
 
@@ -150,6 +152,7 @@ class Repertoire:
         self.acts.clear()
         self.found.clear()
         self.mentioned.clear()
+        self.mentioned_in.clear()
         self.mentions.clear()
         self.rankings.clear()
 
@@ -208,9 +211,11 @@ class Repertoire:
 
     def counted(self, found: Configuration) -> Configuration:
         """The configuration with its numbers counted from the beginning."""
-        parts = (*found.machines, *found.under_way, *found.jobs)
-        key = frozenset(map(self._mentioned, parts))
+        key = self._mentioned_in(found.under_way).union(
+            self._mentioned_in(found.jobs), map(self._mentioned, found.machines)
+        )
         if (ranking := self.rankings.get(key)) is None:
+            parts = (*found.machines, *found.under_way, *found.jobs)
             collected: dict[Kind, set[int]] = {}
             for part in parts:
                 for kind, numbers in self._numbers(part).items():
@@ -232,6 +237,12 @@ class Repertoire:
             numbers = self._numbers(part)
             key = tuple((kind, tuple(sorted(numbers[kind]))) for kind in sorted(numbers))
             known = self.mentioned[part] = self.mentions.setdefault(key, len(self.mentions))
+        return known
+
+    def _mentioned_in(self, parts: frozenset[Message] | frozenset[Job]) -> frozenset[int]:
+        """The same for each of these, found once: a step changes few of them, and a message takes long to be hashed."""
+        if (known := self.mentioned_in.get(parts)) is None:
+            known = self.mentioned_in[parts] = frozenset(map(self._mentioned, parts))
         return known
 
     def _numbers(self, part: int | Message | Job) -> dict[Kind, set[int]]:

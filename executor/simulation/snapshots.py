@@ -8,7 +8,7 @@ thing is copied and compared is looked up once for each type, as explorations do
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterable
 from copy import copy
 from dataclasses import fields, is_dataclass
 from enum import Enum
@@ -41,7 +41,8 @@ def clone(value: T) -> T:
 
 def frozen(value: Any) -> Hashable:
     """A value that is equal for two machines iff all that can change in them is."""
-    found: Hashable = _freezer(value.__class__)(value)
+    freezer = _freezer(value.__class__)
+    found: Hashable = value if freezer is None else freezer(value)
     return found
 
 
@@ -62,14 +63,17 @@ def _copier(of: type) -> Callable[[Any], Any] | None:
             return copier
     if is_dataclass(of):
         names = _names(of)
-        return lambda value: of(**{name: _cloned(getattr(value, name)) for name in names})
+        return lambda value: of(*_copy_of_list([getattr(value, name) for name in names]))
     if issubclass(of, _CHANGING):
         return _copy_of_machine
     raise TypeError(f"a machine holds a {of.__name__}, which is not known here")
 
 
 def _copy_of_tuple(value: tuple[Any, ...]) -> tuple[Any, ...]:
-    return value if all(_copier(each.__class__) is None for each in value) else tuple(map(_cloned, value))
+    for each in value:
+        if _copier(each.__class__) is not None:
+            return tuple(_copy_of_list(value))
+    return value
 
 
 def _copy_of_dict(value: dict[Any, Any]) -> dict[Any, Any]:
@@ -80,8 +84,8 @@ def _copy_of_dict(value: dict[Any, Any]) -> dict[Any, Any]:
     return made
 
 
-def _copy_of_list(value: list[Any]) -> list[Any]:
-    return list(map(_cloned, value))
+def _copy_of_list(value: Iterable[Any]) -> list[Any]:
+    return [each if (copier := _copier(each.__class__)) is None else copier(each) for each in value]
 
 
 def _copy_of_machine(value: Any) -> Any:
@@ -91,24 +95,29 @@ def _copy_of_machine(value: Any) -> Any:
 
 
 @cache
-def _freezer(of: type) -> Callable[[Any], Hashable]:
-    """What values of a type are compared by."""
+def _freezer(of: type) -> Callable[[Any], Hashable] | None:
+    """What values of a type are compared by; None where by themselves."""
     if issubclass(of, (*_FIXED, _DERIVED)):
         return lambda _: None
     if issubclass(of, _SIMPLE) or _is_frozen(of):
-        return lambda value: value
+        return None
     if issubclass(of, tuple | list):
-        return lambda value: tuple(map(frozen, value))
+        return _frozen_each
     if issubclass(of, dict):
-        return lambda value: tuple((key, frozen(each)) for key, each in value.items())
+        return lambda value: tuple(zip(value, _frozen_each(value.values()), strict=True))
     if issubclass(of, set):
         return frozenset
     if is_dataclass(of):
         names = _names(of)
-        return lambda value: tuple(frozen(getattr(value, name)) for name in names)
+        return lambda value: _frozen_each([getattr(value, name) for name in names])
     if issubclass(of, _CHANGING):
-        return lambda value: tuple(map(frozen, vars(value).values()))
+        return lambda value: _frozen_each(vars(value).values())
     raise TypeError(f"a machine holds a {of.__name__}, which is not known here")
+
+
+def _frozen_each(values: Iterable[Any]) -> tuple[Hashable, ...]:
+    # What `frozen` says of each, without a call for each: most are compared by themselves.
+    return tuple([each if (freezer := _freezer(each.__class__)) is None else freezer(each) for each in values])
 
 
 def _is_frozen(of: type) -> bool:

@@ -52,6 +52,8 @@ class LocalTie:
         self.coordinators = coordinators(decomposition)
         self.actions: Counter[str] = Counter()
         self.acts: set[object] = set()
+        self.steps: set[tuple[object, ...]] = set()
+        """Of the present explorer, what was held to the actions already: an act has the same effects each time."""
         self.parts = {name: frozenset(t for t, c in self.takes_part if c == name) for _, name in self.takes_part}
         self.shares: dict[str, Structure] = {}
         self.decided_shares: dict[frozenset[str], Structure] = {}
@@ -67,12 +69,16 @@ class LocalTie:
         if explorer is not self.explorer:
             self.explorer = explorer
             self.held.clear()
+            self.steps.clear()
         message = step.about if isinstance(step.about, Message) else None
         asked: tuple[str, ...] = ()
         if isinstance(message, Decision):
             coordinator = explorer.machine(before.machines[explorer.names.index(message.coordinator)])
             assert isinstance(coordinator, Coordinator)
             asked = self._asked(coordinator, message)
+        if (key := (step.kind, step.before, step.after, step.about, asked)) in self.steps:
+            return
+        self.steps.add(key)
         was, now = explorer.machine(step.before), explorer.machine(step.after)
         if isinstance(was, Coordinator) and isinstance(now, Coordinator):
             self._standing(was, now, message, is_crash=step.kind.endswith("crash"))
