@@ -28,12 +28,12 @@ parametric proof, which has any number of rounds, speaks of these.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 
 from firable.decompose.protocol.building import ProtocolNet
 from firable.decompose.protocol.draft import CHANNELS, at, central
-from firable.decompose.protocol.inductive import invariant
+from firable.decompose.protocol.inductive import Literal, invariant
 from firable.decompose.protocol.rounds import asked, committed, decided
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator, Round
@@ -86,13 +86,11 @@ class NetTie:
         self.stands, self.counted = self._all("stands", free=True), self._all("heard", free=True)
         """Votes that promise nothing: that they stand, and that the coordinator counts them."""
         self.free = [part for part in self.part.values() if part.free]
-        self.sentences = [
-            [
-                tuple(self.net.marking([place for place, full in term if full is wanted]) for wanted in (True, False))
-                for term in one
-            ]
-            for one in invariant(built)
-        ]
+        self.sentences = [[self._masks(term) for term in one] for one in invariant(built)]
+        self.is_so = cache(self._is_so)
+        self.is_firable = cache(self._is_firable)
+        self.near = [m.inputs | m.outputs | m.permissive | m.inhibitive for m in self.net.masks]
+        """The places on which it depends whether a transition is firable."""
         self.memory = [self.net.marking(self._memory(group)) for group in self.parts.groups]
         self.moves: dict[tuple[int, str], list[int]] = {}
         """The transitions of each kind, of each group; of local firings the group is -1."""
@@ -180,12 +178,23 @@ class NetTie:
         tokens |= {at("promised", self.part[t, name]) for _, t, name in promised}
         tokens |= set(self._voted(tokens, [each.machine for each in of if isinstance(each.machine, Coordinator)]))
         told = self.net.marking(tokens)
-        assert all(map(self._is_so(told), self.sentences)), f"what holds of every configuration: {sorted(tokens)}"
+        assert self.is_so(told), f"what holds of every configuration: {sorted(tokens)}"
         return told
 
-    def _is_so(self, marking: Marking) -> Callable[[Sequence[tuple[Marking, ...]]], bool]:
-        """Whether a sentence of the invariant holds of a marking."""
-        return lambda one: any(marking & full == full and not marking & empty for full, empty in one)
+    def _masks(self, term: Iterable[Literal]) -> tuple[Marking, Marking]:
+        """The places that a term of the invariant says are full, and those that it says are empty."""
+        full, empty = (self.net.marking(place for place, value in term if value is wanted) for wanted in (True, False))
+        return full, empty
+
+    def _is_so(self, marking: Marking) -> bool:
+        """Whether the invariant holds of a marking: of each sentence a term."""
+        for one in self.sentences:
+            for full, empty in one:
+                if marking & full == full and not marking & empty:
+                    break
+            else:
+                return False
+        return True
 
     def _voted(self, tokens: set[str], deciding: Sequence[Coordinator]) -> Iterator[str]:
         """The votes of free parts that count, or whose order is to come."""
@@ -246,7 +255,7 @@ class NetTie:
             assert f"fire/{name}" in self.net.transition_index, f"'{name}' fires, and the net has no such step"
             t = self.net.transition_index[f"fire/{name}"]
             assert self._acts(t, actor), f"'{name}' is fired by '{actor}'"
-            assert self._is_firable(marking, t), f"'{name}' fires, and is not firable in the net"
+            assert self.is_firable(marking & self.near[t], t), f"'{name}' fires, and is not firable in the net"
             marking = self.player.fire(marking, (t,))
             self.kinds["fire"] += 1
         reached = self._hear(marking, now, []) & ~self.channels
@@ -268,7 +277,7 @@ class NetTie:
             if marking & stands and not marking & heard and not used and (now & heard or part.whole in fired):
                 for step in ("stand/{}/again", "hear/{}"):
                     t = self.net.transition_index[step.format(f"{part.whole}/{part.controller}")]
-                    if self._is_firable(marking, t):
+                    if self.is_firable(marking & self.near[t], t):
                         marking = self.player.fire(marking, (t,))
                         self.kinds[self.built.steps[self.net.transitions[t].name].kind] += 1
         return marking
@@ -348,7 +357,7 @@ class NetTie:
                         fired.remove(self._fires(t))
                 return marking
             for t in reversed(allowed):
-                if self._is_firable(marking, t):
+                if self.is_firable(marking & self.near[t], t):
                     after = self.player.fire(marking, (t,))
                     if after not in seen and len(seen) < _MARKINGS_MAX:
                         seen.add(after)
@@ -411,7 +420,7 @@ class NetTie:
         for name in names:
             assert name in self.net.transition_index, f"{message}: the net has no '{name}'"
             t = self.net.transition_index[name]
-            assert self._is_firable(marking, t), f"{message}: '{name}' is not firable"
+            assert self.is_firable(marking & self.near[t], t), f"{message}: '{name}' is not firable"
 
 
 def _has_obeyed(kept: Kept, number: int, coordinator: str) -> bool:
