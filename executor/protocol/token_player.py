@@ -12,9 +12,9 @@ This is a compiled copy of the rule, not the rule: `firable.semantics.firing` is
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from types import MappingProxyType
 from typing import Final, Self
 
@@ -104,52 +104,58 @@ class Compiled:
         return bool(self.writes & reads or self.reads & writes)
 
 
+@lru_cache(256)
+def _compiled(net: Net) -> dict[str, Compiled]:
+    """The transitions of a net, compiled once: each start of a machine asks for them again."""
+    signal_bit = {signal.name: 1 << len(net.places) + j for j, signal in enumerate(net.signals)}
+    order = net.place_index.__getitem__
+    commanding = {
+        place.name: Entered(place, tuple((s, signal_bit[s]) for s in place.cleared), 1 << order(place.name))
+        for place in net.places
+        if place.command
+    }
+    compiled = {}
+    for t, transition in enumerate(net.transitions):
+        masks = net.masks[t]
+        opening = sum({signal_bit[gate.signal] for gate in transition.external if gate.wanted})
+        closing = sum({signal_bit[gate.signal] for gate in transition.external if not gate.wanted})
+        moves = masks.inputs | masks.outputs
+        lowest = next(bits(moves), 0)
+        cleared = {signal for place in transition.outputs for signal in net.place(place).cleared}
+        clears = sum(signal_bit[name] for name in cleared)
+        compiled[transition.name] = Compiled(
+            transition.name,
+            needs=masks.inputs | masks.permissive | opening,
+            forbids=masks.outputs | masks.inhibitive | closing,
+            takes=masks.inputs,
+            puts=masks.outputs,
+            clears=clears,
+            openable=transition.openable,
+            lowest=lowest,
+            moved=moves >> lowest,
+            step=(
+                *(literal(bit, value=False) for bit in bits(masks.inputs | clears)),
+                *(literal(bit, value=True) for bit in bits(masks.outputs)),
+            ),
+            pieces=pieces_of(bits(moves | clears)),
+            entered=tuple(commanding[p] for p in sorted(transition.outputs, key=order) if p in commanding),
+        )
+    return compiled
+
+
 @dataclass(frozen=True)
 class TokenPlayer:
     """The compiled transitions of a net, by name in the order of the net."""
 
     net: Net
-    transitions: dict[str, Compiled]
+    transitions: Mapping[str, Compiled]
     places: Word
     """The bits of the places."""
 
     @classmethod
     def of(cls, net: Net) -> Self:
         """Compile a net."""
-        signal_bit = {signal.name: 1 << len(net.places) + j for j, signal in enumerate(net.signals)}
-        order = net.place_index.__getitem__
-        commanding = {
-            place.name: Entered(place, tuple((s, signal_bit[s]) for s in place.cleared), 1 << order(place.name))
-            for place in net.places
-            if place.command
-        }
-        compiled = {}
-        for t, transition in enumerate(net.transitions):
-            masks = net.masks[t]
-            opening = sum({signal_bit[gate.signal] for gate in transition.external if gate.wanted})
-            closing = sum({signal_bit[gate.signal] for gate in transition.external if not gate.wanted})
-            moves = masks.inputs | masks.outputs
-            lowest = next(bits(moves), 0)
-            cleared = {signal for place in transition.outputs for signal in net.place(place).cleared}
-            clears = sum(signal_bit[name] for name in cleared)
-            compiled[transition.name] = Compiled(
-                transition.name,
-                needs=masks.inputs | masks.permissive | opening,
-                forbids=masks.outputs | masks.inhibitive | closing,
-                takes=masks.inputs,
-                puts=masks.outputs,
-                clears=clears,
-                openable=transition.openable,
-                lowest=lowest,
-                moved=moves >> lowest,
-                step=(
-                    *(literal(bit, value=False) for bit in bits(masks.inputs | clears)),
-                    *(literal(bit, value=True) for bit in bits(masks.outputs)),
-                ),
-                pieces=pieces_of(bits(moves | clears)),
-                entered=tuple(commanding[p] for p in sorted(transition.outputs, key=order) if p in commanding),
-            )
-        return cls(net, compiled, (1 << len(net.places)) - 1)
+        return cls(net, _compiled(net), (1 << len(net.places)) - 1)
 
     def marking(self, word: Word) -> Marking:
         """The marking in the word."""
