@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from itertools import combinations
 
 import pytest
@@ -52,9 +53,17 @@ def said(effects: list[Effect], one: str = "", other: str = "") -> set[Effect]:
     }
 
 
+@cache
+def explored(cell: str, t: str) -> Deciding:
+    """The coordinator of a cell explored to the end about the group of a transition; only looked at and copied."""
+    decomposition = decomposition_of(cell)
+    explorer = Deciding(decomposition, TOP, group_of(decomposition, t))
+    assert explore(explorer, CRASH).complete
+    return explorer
+
+
 def met(explorer: Deciding) -> Iterator[tuple[Coordinator, ToCoordinator]]:
     """Coordinators that an exploration has met, with nothing of other groups, and everything that may arrive."""
-    assert explore(explorer, CRASH).complete
     for number in sorted(n for n in explorer.reached if isinstance(explorer.machine(n), Coordinator)):
         machine = explorer.coordinator(explorer.spread_out(number))
         for message in explorer.hearing.messages(machine):
@@ -85,8 +94,7 @@ def hold_alike(explorer: Deciding, of: type[Coordinator] = Coordinator) -> int:
 def test_whatever_arrives_a_coordinator_does_not_tell_controllers_apart_that_take_part_alike(
     cell: str, t: str, alike: int
 ) -> None:
-    decomposition = decomposition_of(cell)
-    explorer = Deciding(decomposition, TOP, group_of(decomposition, t))
+    explorer = explored(cell, t)
     assert [len(names) for names in explorer.hearing.alike] == [alike]
     assert hold_alike(explorer) > 1000
 
@@ -109,16 +117,14 @@ def test_a_coordinator_that_prefers_a_controller_is_found() -> None:
             asked = [n for n, opened in self.rounds.items() if not opened.decided]
             return [] if message.controller == "mc" and asked else super().receive(message)
 
-    decomposition = decomposition_of("one_robot")
-    explorer = Deciding(decomposition, TOP, group_of(decomposition, "G4"))
+    explorer = explored("one_robot", "G4")
     with pytest.raises(AssertionError, match="is not answered as"):
         hold_alike(explorer, of=Prefers)
 
 
 @pytest.mark.parametrize(("cell", "t"), [("one_robot", "G4"), ("free two_robots_shared", "G5")])
 def test_those_that_are_alike_come_in_one_order_whoever_of_them_is_known_for_what(cell: str, t: str) -> None:
-    decomposition = decomposition_of(cell)
-    explorer = Deciding(decomposition, TOP, group_of(decomposition, t))
+    explorer = explored(cell, t)
     (alike,) = explorer.hearing.alike
     different = 0
     for machine in {id(machine): machine for machine, _ in met(explorer)}.values():
