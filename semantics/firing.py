@@ -34,19 +34,21 @@ def firable(algebra: BooleanAlgebra[B], net: Net, t: int, holds: Valuation[B]) -
 
 def gates_and_inputs(algebra: BooleanAlgebra[B], net: Net, t: int, holds: Valuation[B]) -> B:
     """The part of Eq. (1) that the ordinary net with read and inhibitor arcs has: all but the output places."""
-    transition, index = net.transitions[t], net.place_index
+    # `map`, and no generator, here and below: all that is played in Python comes by here for each transition.
+    transition, index = net.transitions[t], net.place_index.__getitem__
     return algebra.conjunction(
         [
-            *(holds(index[place]) for place in transition.inputs),
-            *(holds(index[place]) for place in transition.permissive),
-            *(algebra.negation(holds(index[place])) for place in transition.inhibitive),
+            *map(holds, map(index, transition.inputs)),
+            *map(holds, map(index, transition.permissive)),
+            *map(algebra.negation, map(holds, map(index, transition.inhibitive))),
         ]
     )
 
 
 def outputs_empty(algebra: BooleanAlgebra[B], net: Net, t: int, holds: Valuation[B]) -> B:
     """The part of Eq. (1) that the contact rule adds: no output place of `t` holds a token."""
-    return algebra.conjunction(algebra.negation(holds(net.place_index[place])) for place in net.transitions[t].outputs)
+    index = net.place_index.__getitem__
+    return algebra.conjunction(map(algebra.negation, map(holds, map(index, net.transitions[t].outputs))))
 
 
 def in_contact(algebra: BooleanAlgebra[B], net: Net, t: int, holds: Valuation[B]) -> B:
@@ -76,6 +78,6 @@ def next_token(algebra: BooleanAlgebra[B], net: Net, p: int, holds: Valuation[B]
 
     `fires` must be the arbitrated firing: at most one consumer and one producer of `p`.
     """
-    taken = algebra.disjunction(fires(t) for t in net.consumers[p])
-    put = algebra.disjunction(fires(t) for t in net.producers[p])
+    taken = algebra.disjunction(map(fires, net.consumers[p]))
+    put = algebra.disjunction(map(fires, net.producers[p]))
     return algebra.disjunction([algebra.conjunction([holds(p), algebra.negation(taken)]), put])

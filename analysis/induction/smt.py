@@ -14,9 +14,10 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import cached_property
 from typing import Any, Final
 
 import z3
@@ -67,17 +68,17 @@ class Terms:
 
     def _term(self, operator: Operator, operands: tuple[Term, ...] = (), name: str = "") -> Term:
         key = (operator, name, *map(id, operands))
-        if key not in self._known:
+        if (known := self._known.get(key)) is None:
             # The table keeps each term, so that no id is used again while it lives.
-            self._known[key] = Term(operator, operands, name)
-        return self._known[key]
+            known = self._known[key] = Term(operator, operands, name)
+        return known
 
-    @property
+    @cached_property
     def true(self) -> Term:
         """The constant true."""
         return self._term(Operator.TRUE)
 
-    @property
+    @cached_property
     def false(self) -> Term:
         """The constant false."""
         return self._term(Operator.FALSE)
@@ -348,11 +349,18 @@ def z3_term(term: Term, operands: Sequence[z3.BoolRef], context: z3.Context | No
         case Operator.NOT:
             return z3.Not(operands[0])
         case Operator.AND:
-            return z3.And(operands)
+            return _of_all(z3.Z3_mk_and, operands)
         case Operator.OR:
-            return z3.Or(operands)
+            return _of_all(z3.Z3_mk_or, operands)
         case Operator.EQUAL:
             return operands[0] == operands[1]
+
+
+def _of_all(make: Callable[..., object], operands: Sequence[z3.BoolRef]) -> z3.BoolRef:
+    """One term over some operands of one context: what `z3.And` and `z3.Or` make, without all that these look up."""
+    context = operands[0].ctx
+    asts = (z3.Ast * len(operands))(*[operand.as_ast() for operand in operands])
+    return z3.BoolRef(make(context.ref(), len(operands), asts), context)
 
 
 def decide(assertions: Sequence[Term], *, timeout_ms: int | None = None) -> Decision:
