@@ -141,13 +141,15 @@ class FormulaParser:
 
     def __init__(self, text: str) -> None:
         self.tokens = list(tokens_of(text))
+        # The words alone, and what stands for the end: they are looked at several times each.
+        self.words: list[str | None] = [*(token.text for token in self.tokens), None]
         self.position = 0
         self.end = len(text)
         self.depth = 0
 
     def peek(self) -> str | None:
         """The next token, or None at the end."""
-        return self.tokens[self.position].text if self.position < len(self.tokens) else None
+        return self.words[self.position]
 
     def column(self) -> int:
         """Where the next token stands."""

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 _SIGN: Final = r"<=|>=|!=|=|<|>"
 _END: Final = r"(?=\s|[()\[\],]|->|$)"
@@ -24,8 +23,7 @@ _TOKEN: Final = re.compile(
 _IN_COMPARISON: Final = re.compile(rf"\s*(?:(?P<sign>{_SIGN}|\+)|(?P<number>[0-9]+)(?=\s*(?:{_SIGN}|[()\]]|\s|->|$)))")
 
 
-@dataclass(frozen=True, slots=True)
-class Token:
+class Token(NamedTuple):
     """A word, the column (from 0) of its first character, and whether it stands in quotes."""
 
     text: str

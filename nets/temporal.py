@@ -151,6 +151,10 @@ class Logic(StrEnum):
     LTL = "ltl"
 
 
+_CTL: Final = frozenset({Logic.CTL})
+_LTL: Final = frozenset({Logic.LTL})
+_BOTH: Final = _CTL | _LTL
+
 _UNARY: Final[dict[str, type[Next | Eventually | Globally]]] = {"X": Next, "F": Eventually, "G": Globally}
 _BINARY: Final[dict[str, type[Until | Release | WeakUntil]]] = {"U": Until, "R": Release, "W": WeakUntil}
 _QUANTIFIERS: Final[dict[str, type[Exists | ForAll]]] = {"E": Exists, "A": ForAll}
@@ -288,16 +292,18 @@ def logics(formula: Temporal) -> frozenset[Logic]:
 
     Raises `FormulaError` where it mixes them.
     """
-    found: frozenset[Logic] = frozenset(Logic)
+    if isinstance(formula, Formula):
+        return _BOTH
+    found = _BOTH
     for part in operands_of(formula):
         found &= logics(part)
     match formula:
         case Exists(path) | ForAll(path):
             if not isinstance(path, Next | Eventually | Globally | Until):
                 raise FormulaError("a quantifier of CTL stands before X, F, G or U", 0)
-            found = frozenset({Logic.CTL}) & frozenset.intersection(frozenset(Logic), *map(logics, operands_of(path)))
+            found = _CTL.intersection(*map(logics, operands_of(path)))
         case Next() | Eventually() | Globally() | Until() | Release() | WeakUntil() | Fires():
-            found &= {Logic.LTL}
+            found &= _LTL
     if not found:
         raise FormulaError("CTL and LTL are mixed: write E or A before every X, F, G, U, or before none", 0)
     return found

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from functools import lru_cache
 from typing import Final
 
 Formula = int
@@ -21,6 +22,7 @@ FALSE: Final[Formula] = 1
 _BY_NUMBER: Final = re.compile(r"[^ -~]|[|\\%]")
 
 
+@lru_cache(2**16)
 def spelled(name: str) -> str:
     """A name as a file spells it: what is not printable ASCII, a bar, a backslash or `%` by its number.
 
