@@ -33,8 +33,12 @@ def net_with(n_places: int, chosen: tuple[Shape, ...], initial: Marking = 0) -> 
 
 def all_nets(n_places: int, n_transitions: int, chunk: int = 0, chunks: int = 1) -> Iterator[tuple[Shape, ...]]:
     """The shapes of every net with this many places and transitions, or of one chunk of them."""
-    nets = filter(_is_first, combinations_with_replacement(shapes(n_places), n_transitions))
-    return islice(nets, chunk, None, chunks)
+    return islice(_all_of(n_places, n_transitions), chunk, None, chunks)
+
+
+@cache
+def _all_of(n_places: int, n_transitions: int) -> tuple[tuple[Shape, ...], ...]:
+    return tuple(filter(_is_first, combinations_with_replacement(shapes(n_places), n_transitions)))
 
 
 def _is_first(chosen: tuple[Shape, ...]) -> bool:
