@@ -10,6 +10,7 @@ verdicts are numbered in the order of the formulas' names.
 import csv
 import os
 from collections.abc import Iterable, Iterator
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Final
 
@@ -25,9 +26,10 @@ from firable.analysis.temporal.on_the_fly import decide_ltl_on_the_fly
 from firable.analysis.temporal.queries import answer
 from firable.analysis.temporal.sets import Sets
 from firable.analysis.temporal.simplifying import simplified
-from firable.nets.loading import load
+from firable.nets.loading import Loaded, load
 from firable.nets.net import Net
 from firable.nets.queries import Query, QueryKind, parse_query, read_queries
+from firable.nets.temporal import Temporal
 from firable.nets.verdict import Status, Verdict
 
 FOLDER = os.environ.get("FIRABLE_NETS", "")
@@ -55,6 +57,7 @@ GLOBAL: Final = {
 STATUS: Final = {Status.PROVED: "TRUE", Status.VIOLATED: "FALSE", Status.UNKNOWN: "unknown"}
 
 
+@cache
 def table(name: str) -> list[dict[str, str]]:
     if not (Path(FOLDER) / name).is_file():
         return []
@@ -74,6 +77,7 @@ def nets() -> list[str]:
     ]
 
 
+@cache
 def published() -> dict[tuple[str, str, int], str]:
     rows = table("queries/expected.tsv")
     return {(row["net"], row["examination"], int(row["index"])): row["value"] for row in rows}
@@ -85,8 +89,14 @@ def value(verdict: Verdict, kind: QueryKind) -> str:
     return STATUS[verdict.status]
 
 
+@cache
+def loaded_net(file: str) -> Loaded:
+    return load(Path(FOLDER) / file)
+
+
+@lru_cache(64)
 def space_of(file: str) -> tuple[ReachabilityGraph, dict[str, str]]:
-    loaded = load(Path(FOLDER) / file)
+    loaded = loaded_net(file)
     return explore(loaded.net), dict(loaded.renamed)
 
 
@@ -130,7 +140,7 @@ def asked_of(file: str, net: Net, renamed: dict[str, str], examinations: Iterabl
 @pytest.mark.skipif(not FOLDER, reason="FIRABLE_NETS does not name the folder of the public nets")
 @pytest.mark.parametrize("file", large_nets())
 def test_what_is_decided_of_large_nets_on_the_fly_is_what_was_published(file: str) -> None:
-    loaded = load(Path(FOLDER) / file)
+    loaded = loaded_net(file)
     compared = 0
     for query, wanted in asked_of(file, loaded.net, dict(loaded.renamed), ("LTLCardinality", "LTLFireability")):
         if query.kind is not QueryKind.LTL or query.formula is None:
@@ -156,41 +166,43 @@ def nets_beyond_sets() -> list[str]:
     ]
 
 
+@cache
+def decided_locally(file: str, formula: Temporal) -> bool | None:
+    """Whether a formula holds at the start, None where that takes too many markings; many are as simple as they get."""
+    try:
+        return decide_ctl_on_the_fly(loaded_net(file).net, formula, Limits(), markings=LOCAL_MARKINGS_MAX).answer.holds
+    except IncompleteGraph:
+        return None
+
+
 @pytest.mark.skipif(not FOLDER, reason="FIRABLE_NETS does not name the folder of the public nets")
 @pytest.mark.parametrize("file", nets_beyond_sets())
 def test_what_is_decided_of_large_nets_marking_by_marking_is_what_was_published(file: str) -> None:
-    loaded = load(Path(FOLDER) / file)
+    loaded = loaded_net(file)
     compared = 0
     for query, wanted in asked_of(file, loaded.net, dict(loaded.renamed), ("CTLCardinality", "CTLFireability")):
         assert query.formula is not None
-        try:
-            found = decide_ctl_on_the_fly(loaded.net, query.formula, Limits(), markings=LOCAL_MARKINGS_MAX)
-        except IncompleteGraph:
-            continue
-        assert found.answer.holds is (wanted == "TRUE"), query.name
-        compared += 1
+        if (holds := decided_locally(file, query.formula)) is not None:
+            assert holds is (wanted == "TRUE"), query.name
+            compared += 1
     assert compared >= DECIDED_MIN
 
 
 @pytest.mark.skipif(not FOLDER, reason="FIRABLE_NETS does not name the folder of the public nets")
 @pytest.mark.parametrize("file", nets_beyond_sets())
 def test_simpler_formulas_of_large_nets_say_nothing_else(file: str) -> None:
-    loaded = load(Path(FOLDER) / file)
+    loaded = loaded_net(file)
     for query, wanted in asked_of(file, loaded.net, dict(loaded.renamed), ("CTLCardinality", "CTLFireability")):
         assert query.formula is not None
-        simpler = simplified(query.formula)
-        try:
-            found = decide_ctl_on_the_fly(loaded.net, simpler, Limits(), markings=LOCAL_MARKINGS_MAX)
-        except IncompleteGraph:
-            continue
-        assert found.answer.holds is (wanted == "TRUE"), query.name
+        if (holds := decided_locally(file, simplified(query.formula))) is not None:
+            assert holds is (wanted == "TRUE"), query.name
 
 
 @pytest.mark.skipif(not FOLDER, reason="FIRABLE_NETS does not name the folder of the public nets")
 @pytest.mark.parametrize("name", QUICK_DIAGRAMS)
 def test_ctl_on_diagrams_of_large_nets_has_the_published_values(name: str) -> None:
     file = next(row["file"] for row in table("expected.tsv") if Path(row["file"]).stem == name)
-    loaded = load(Path(FOLDER) / file)
+    loaded = loaded_net(file)
     space = explore_symbolically(loaded.net)
     asked = list(asked_of(file, loaded.net, dict(loaded.renamed), ("CTLCardinality", "CTLFireability")))
     for query, wanted in asked:
