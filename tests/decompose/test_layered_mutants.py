@@ -7,22 +7,21 @@ import pytest
 from support.bundle_mutants import decomposition_mutants, line_mutants, verdict_mutants
 from support.examples import some
 from support.layered_nets import cells_in_a_line
+from support.remembered import answered, examined, read
 
 from firable.analysis.check import check
-from firable.analysis.evidence.checking.checker import CheckedRecord, check_document
-from firable.analysis.evidence.document import Document
 from firable.decompose.bundling import make_bundle
 from firable.decompose.splitting.cut import split
-from firable.decompose.verification import documents
+from firable.decompose.verification import documents, outages
 from firable.decompose.verification.bereft import PREFIX
 from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.checking import check_bundle
 from firable.decompose.verification.explored import TITLES, check_explored
 from firable.decompose.verification.obligations import compared
+from firable.decompose.verification.outage_obligations import OutageObligations
 from firable.decompose.verification.outages import check_outages
 from firable.decompose.verification.recut import check_cut
 from firable.decompose.verification.refusal import NotShownError
-from firable.decompose.verification.solvers import by_cvc5
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net
 from firable.nets.diagnostics import InputError
@@ -40,23 +39,16 @@ def bundled() -> Bundle:
 
 @pytest.fixture(autouse=True)
 def remembering(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, int], tuple[str, ...]]:
-    """What a solver answers to one text, and a checker to one document, is found once: a mutant changes few of them."""
-    answers: dict[str, tuple[str, ...]] = {}
-    records: dict[str, tuple[CheckedRecord, ...]] = {}
+    """What a solver answers to one text, and a checker to one document, is found once: a mutant changes few of them.
 
-    def solver(text: str, timeout_ms: int) -> tuple[str, ...]:
-        return answers[text] if text in answers else answers.setdefault(text, by_cvc5(text, timeout_ms))
-
-    def checker(document: Document, timeout_ms: int) -> Iterator[CheckedRecord]:
-        text = document.to_text()
-        if text not in records:
-            records[text] = tuple(check_document(document, timeout_ms=timeout_ms))
-        return iter(records[text])
-
-    monkeypatch.setattr("firable.decompose.verification.checking.SOLVERS", {"cvc5": solver})
-    monkeypatch.setattr(documents, "check_document", checker)
+    The same of what must be proved of one protocol, as stated anew, and of reading a document.
+    """
+    monkeypatch.setattr("firable.decompose.verification.checking.SOLVERS", {"cvc5": answered})
+    monkeypatch.setattr(documents, "document_from_text", read)
+    monkeypatch.setattr(documents, "check_document", examined)
     monkeypatch.setattr(documents, "obligations", lambda *_, **__: ())
-    return solver
+    monkeypatch.setattr(outages, "OutageObligations", cache(OutageObligations))
+    return answered
 
 
 def cut_survivors(bundle: Bundle, one_in: int) -> tuple[int, list[tuple[str, Callable[[], Bundle]]]]:

@@ -9,6 +9,7 @@ from functools import cache, partial
 from typing import Any
 
 import pytest
+from support import remembered
 from support.bundle_mutants import evidence_mutants, line_mutants, verdict_mutants
 from support.examples import some
 from support.explored_outages import is_as_explored
@@ -18,7 +19,6 @@ from support.looping_nets import looping_net
 from support.outage_nets import gated, overtaken
 from support.owned_nets import owned_net
 
-from firable.analysis.evidence.checking.checker import CheckedRecord, check_document
 from firable.analysis.evidence.document import Document, document_from_text
 from firable.decompose.protocol.bereft import Bereft, deaths
 from firable.decompose.protocol.dead_script import DeadObligations, DeadProof, prove_of_the_dead
@@ -68,16 +68,9 @@ def asked(text: str, timeout_ms: int) -> tuple[str, ...]:
 
 @pytest.fixture(autouse=True)
 def remembering(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What the checker says of one document is found once, and the solver is not asked again."""
-    records: dict[str, tuple[CheckedRecord, ...]] = {}
-
-    def checker(document: Document, timeout_ms: int) -> Iterator[CheckedRecord]:
-        text = document.to_text()
-        if text not in records:
-            records[text] = tuple(check_document(document, timeout_ms=timeout_ms))
-        return iter(records[text])
-
-    monkeypatch.setattr(documents, "check_document", checker)
+    """A document is read once, what the checker says of it is found once, and the solver is not asked again."""
+    monkeypatch.setattr(documents, "document_from_text", remembered.read)
+    monkeypatch.setattr(documents, "check_document", remembered.examined)
     monkeypatch.setattr(documents, "obligations", lambda *_, **__: ())
 
 

@@ -1,10 +1,10 @@
-"""Answers of the second solver and findings of the checker that many tests and mutants share, found once a process."""
+"""Documents, answers of the second solver and findings of the checker that many mutants share, found once a process."""
 
 from collections.abc import Iterator
 from functools import cache
 
 from firable.analysis.evidence.checking.checker import CheckedRecord, check_document
-from firable.analysis.evidence.document import Document
+from firable.analysis.evidence.document import Document, document_from_text
 from firable.decompose.verification.solvers import by_cvc5
 
 _found: dict[tuple[str, int], tuple[CheckedRecord, ...]] = {}
@@ -14,6 +14,12 @@ _found: dict[tuple[str, int], tuple[CheckedRecord, ...]] = {}
 def answered(text: str, timeout_ms: int) -> tuple[str, ...]:
     """What cvc5 answers to a text."""
     return by_cvc5(text, timeout_ms)
+
+
+@cache
+def read(text: str, file: str = "") -> Document:
+    """What a text is read as."""
+    return document_from_text(text, file)
 
 
 def examined(document: Document, timeout_ms: int) -> Iterator[CheckedRecord]:

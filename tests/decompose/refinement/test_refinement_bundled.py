@@ -14,11 +14,10 @@ from hypothesis import strategies as st
 from support.bundle_mutants import evidence_mutants, line_mutants, net_mutants, verdict_mutants
 from support.examples import examples, some
 from support.random_tasks import nested, random_conceptual, random_task
+from support.remembered import examined, read
 
 from firable.analysis import branching_bisimilar, explore, report_on
 from firable.analysis.check import check
-from firable.analysis.evidence.checking.checker import CheckedRecord, check_document
-from firable.analysis.evidence.document import Document
 from firable.decompose.bundling import make_bundle
 from firable.decompose.refinement.binding import bindings
 from firable.decompose.refinement.closed import BlockProof, closed, prove_block
@@ -114,16 +113,9 @@ def of_the_cell() -> Bundle:
 
 @pytest.fixture
 def remembering(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What the checker says of one document is found once, and the solver is not asked again."""
-    records: dict[str, tuple[CheckedRecord, ...]] = {}
-
-    def checker(document: Document, timeout_ms: int) -> Iterator[CheckedRecord]:
-        text = document.to_text()
-        if text not in records:
-            records[text] = tuple(check_document(document, timeout_ms=timeout_ms))
-        return iter(records[text])
-
-    monkeypatch.setattr(documents, "check_document", checker)
+    """A document is read once, what the checker says of it is found once, and the solver is not asked again."""
+    monkeypatch.setattr(documents, "document_from_text", read)
+    monkeypatch.setattr(documents, "check_document", examined)
     monkeypatch.setattr(documents, "obligations", lambda *_, **__: ())
 
 
