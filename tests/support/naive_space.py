@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 from firable.analysis.deadline import NEVER, Deadline
@@ -24,6 +24,12 @@ from firable.semantics.trace import Discipline
 Markings = frozenset[Marking]
 
 
+@lru_cache(256)
+def _played(net: Net, discipline: Discipline) -> dict[Marking, list[tuple[FiringSet, Marking]]]:
+    """The graph of a net, which nobody changes: many claims are asked of one net, most of them read anew for each."""
+    return Player(net).reachable(step=discipline is Discipline.STEP)
+
+
 @dataclass(frozen=True)
 class NaiveSpace(Derived[Markings]):
     """All markings reachable from M0, by the reference player."""
@@ -38,7 +44,7 @@ class NaiveSpace(Derived[Markings]):
     @cached_property
     def graph(self) -> dict[Marking, list[tuple[FiringSet, Marking]]]:
         """Each reachable marking, breadth first, with its outgoing edges."""
-        return Player(self.net).reachable(step=self.discipline is Discipline.STEP)
+        return _played(self.net, self.discipline)
 
     @property
     def cost(self) -> Cost:
