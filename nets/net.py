@@ -254,7 +254,7 @@ class Masks:
     inhibitive: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Net:
     """An extended Petri net; `places`, `transitions` and `signals` give the order of the indexes.
 
@@ -265,6 +265,8 @@ class Net:
     ...     transitions=(Transition("start", ("Machine",), ("Task",)), Transition("end", ("Task",), ("Machine",))))
     >>> net.names(net.initial_marking)
     ('Machine',)
+    >>> net
+    <Net fig2a: 2 places, 2 transitions>
     """
 
     name: str
@@ -282,6 +284,10 @@ class Net:
 
         if found := list(islice(problems(self), _PROBLEMS_MAX)):
             raise InputError(found)
+
+    def __repr__(self) -> str:
+        """A line, however large the net is; `firable.nets.printing` prints all of it."""
+        return f"<Net {self.name}: {len(self.places):,} places, {len(self.transitions):,} transitions>"
 
     @cached_property
     def place_index(self) -> Mapping[str, int]:

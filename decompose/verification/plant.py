@@ -122,7 +122,12 @@ class Things:
         ]
 
     def assert_exists(self, state: State, changes: Mapping[str, Value]) -> None:
-        """After changes nothing is broken off but by a machine at a stop; raises `DiffersError`."""
+        """What has changed has one of its values, and nothing is broken off but by a machine at a stop.
+
+        Raises `DiffersError` where it is not so: no state is compared in which it is not.
+        """
+        if stray := next((thing for thing, value in changes.items() if value not in self.values(thing)), None):
+            raise DiffersError(f"'{stray}' becomes {changes[stray]}, which it never is")
         for machine in self.model.machines:
             at, breaks = f"at {machine}", f"breaks off {machine}"
             if breaks not in self.things or changes.keys().isdisjoint((at, breaks)):

@@ -94,14 +94,14 @@ def compare_one(plant: Plant, name: str, transitions: Sequence[Transition]) -> i
     for t in transitions:
         if not ended <= {*t.outputs, *t.inhibitive}:
             raise DiffersError(f"'{t.name}' may happen after an accident")
-    ways, count = [_Way.of(t) for t in transitions], 0
-    open_ = [_State({ACCIDENT: False, OVERRUN: False})]
+    count, open_ = 0, [(_State({ACCIDENT: False, OVERRUN: False}), [_Way.of(t) for t in transitions])]
     while open_:
-        state = open_.pop()
+        state, ways = open_.pop()
+        left = [way for way in ways if way.may_fire(plant, state)]
         try:
-            _compare_in(plant, name, ways, state)
+            _compare_in(plant, name, left, state)
         except _UnseenError as error:
-            open_ += (_State({**state, **more}) for more in plant.ways_to_know(str(error), state))
+            open_ += ((_State({**state, **more}), left) for more in plant.ways_to_know(str(error), state))
             continue
         if (count := count + 1) > STATES_MAX:
             raise UncomparedError(f"'{name}' looks at more things than are compared")
@@ -121,30 +121,31 @@ class _Way(NamedTuple):
         full, empty = (*t.inputs, *t.permissive), (*t.outputs, *t.inhibitive)
         return cls(full, empty, frozenset(t.inputs), frozenset(t.outputs))
 
-    def firable(self, plant: Plant, state: _State) -> bool:
-        """Whether it is, as far as is known: raises `_UnseenError` where that lies at something left open."""
-        unseen = ""
+    def may_fire(self, plant: Plant, state: _State) -> bool:
+        """Whether nothing that is known keeps it from firing."""
         for places, wanted in ((self.full, True), (self.empty, False)):
-            for place in places:
-                thing, value = plant.thing_of[place]
-                if thing not in state:
-                    unseen = unseen or thing
-                elif (state[thing] == value) != wanted:
+            for thing, value in map(plant.thing_of.__getitem__, places):
+                if thing in state and (state[thing] == value) != wanted:
                     return False
-        if unseen:
-            raise _UnseenError(unseen)
         return True
+
+    def look(self, plant: Plant, state: _State) -> None:
+        """Look at all that it goes by; raises `_UnseenError` for what is left open."""
+        for place in (*self.full, *self.empty):
+            _ = state[plant.thing_of[place][0]]
 
 
 def _compare_in(plant: Plant, name: str, ways: Iterable[_Way], state: _State) -> None:
+    """Compare in one state, of `ways` that may fire in it: they do where nothing that they go by is left open."""
     changes = list(plant.happenings[name](state))
-    firable = [way for way in ways if way.firable(plant, state)]
+    for way in ways:
+        way.look(plant, state)
     for one in changes:
         for thing in one:
             _ = state[thing]
         plant.assert_exists(_State({**state, **one}), one)
     marked = _marked(plant, state)
-    if {_marked(plant, {**state, **one}) for one in changes} != {marked - way.takes | way.fills for way in firable}:
+    if {_marked(plant, {**state, **one}) for one in changes} != {marked - way.takes | way.fills for way in ways}:
         told = ", ".join(f"{thing}: {value}" for thing, value in state.items() if value)
         raise DiffersError(f"'{name}' does not go as the plant file says, where {told or 'nothing is so'}")
 

@@ -8,7 +8,7 @@ import re
 from pathlib import Path
 
 import pytest
-from support.sessions import fits, run, session
+from support.sessions import fits, run_here, session
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -24,7 +24,7 @@ def test_every_command_of_the_readme_prints_what_it_shows(tmp_path: Path) -> Non
             (tmp_path / name).write_text(text, encoding="utf-8")
             continue
         for command, shown in session(text):
-            done = run(command, tmp_path, status)
+            done = run_here(command, tmp_path, status)
             status, commands = done.returncode, commands + 1
             assert fits(shown, done.stdout), f"$ {command}\n{done.stdout}"
     assert commands >= 10

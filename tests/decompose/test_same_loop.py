@@ -238,6 +238,12 @@ def test_what_is_broken_off_after_a_stop_is_found_where_both_readings_forget_it(
         compare_one(plant, name, some)
 
 
+def test_a_machine_at_what_stops_it_at_once_is_a_difference() -> None:
+    plant = Plant(parse_net(STOPS), parse_plant(STOPS_PLANT), Sending.AT_ONCE)
+    with pytest.raises(DiffersError, match=r"'at R' becomes r\.halt, which it never is"):
+        plant.assert_exists(plant.start, {"at R": "r.halt"})
+
+
 def test_what_would_be_asked_in_too_many_states_is_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
     net, model, loop = closed("one_robot")
     monkeypatch.setattr(same_loop, "STATES_MAX", 10)

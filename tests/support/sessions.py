@@ -1,7 +1,8 @@
 """Console sessions of documents: the commands after `$ `, each with the output that the document shows.
 
 What is a command of firable alone may be run in this process, where its modules are loaded and what the solvers said
-of the theorem is known: that takes a third of the time. The README is run by a shell, as whoever tries it would.
+of the theorem is known: that takes a third of the time. What needs a shell, as a quoted formula does, is run by one, as
+whoever tries it would.
 """
 
 import contextlib
