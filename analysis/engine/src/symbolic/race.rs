@@ -33,10 +33,12 @@ const PATIENCE: u64 = 7;
 /// The rounds for which the order that the net came in, and its reverse, are spared when others drop out.
 const SPARED_ROUNDS: u32 = 2;
 /// The searches that run to the end, how many times less than the first of them the second gets, and how many times less
-/// those that stay beside them.
+/// those that stay beside them. These wait for some rounds, in which most leaders are done, and lose little by it: each
+/// round is as long as all before it.
 const FINALISTS: usize = 2;
 const RUNNER_UP: u64 = 4;
 const BESIDE: u64 = 8;
+const ROUNDS_ALONE: u32 = 3;
 
 /// Twins differ in their nodes by at most one in so many, after so many rounds.
 const TWINS_APART: usize = 12;
@@ -180,6 +182,8 @@ pub(super) struct Race {
     /// How often some dropped out, and whether only those who stay to the end are left.
     thinned: u32,
     settled: bool,
+    /// The rounds since then.
+    rounds_settled: u32,
 }
 
 impl Race {
@@ -199,7 +203,17 @@ impl Race {
             field[at].is_shortest = at == 0 || field[at].is_reverse_of(&field[0]);
         }
         let first = FUEL + FUEL_PER_LEVEL * places as u64;
-        Ok(Race { transitions, initial, field, fuel: first, first, spent: 0, thinned: 0, settled: false })
+        Ok(Race {
+            transitions,
+            initial,
+            field,
+            fuel: first,
+            first,
+            spent: 0,
+            thinned: 0,
+            settled: false,
+            rounds_settled: 0,
+        })
     }
 
     /// Whether some drop out by now: most races are over before.
@@ -228,6 +242,10 @@ impl Race {
         while at < self.field.len() {
             let others = self.field.iter().map(Racer::bytes).sum::<usize>() - self.field[at].bytes();
             let share = match self.field[at].spared {
+                true if self.settled && self.rounds_settled < ROUNDS_ALONE => {
+                    at += 1;
+                    continue;
+                }
                 true if self.settled => self.fuel / BESIDE,
                 false if at > 0 && running(&self.field) <= FINALISTS => self.fuel / RUNNER_UP,
                 _ => self.fuel,
@@ -251,6 +269,7 @@ impl Race {
         }
         self.spent += self.fuel;
         drop_twins(&mut self.field);
+        self.rounds_settled += u32::from(self.settled);
         if self.is_long() && !self.settled {
             self.thinned += 1;
             self.settled = thin_out(&mut self.field, self.thinned);
@@ -425,6 +444,7 @@ mod tests {
             let watch = &mut Watch::new(None, &mut poll);
             let net = (transitions.clone(), initial.clone());
             let mut race = Race::new(places, net, Some(all.clone()), watch).expect("enough room");
+            (race.first, race.fuel) = (SLOW, SLOW); // enough to tell them apart
             while !race.settled {
                 assert!(race.round(1 << 30, watch).expect("enough room").is_none(), "the race is over too soon");
             }
@@ -435,6 +455,16 @@ mod tests {
         assert!([&across, &back(&across)].iter().all(|order| stays.contains(order)), "{}", stays.len());
         let count = stays.len();
         assert!(count > FINALISTS && running(&race.field) == FINALISTS);
+        // It waits for some rounds, in which most leaders are done.
+        let beside =
+            |race: &Race| race.field.iter().filter(|racer| racer.spared).map(Racer::standing).collect::<Vec<_>>();
+        let (waiting, mut poll) = (beside(&race), unwatched);
+        for round in 0..=ROUNDS_ALONE {
+            let found = race.round(1 << 30, &mut Watch::new(None, &mut poll)).expect("enough room");
+            assert!(found.is_none(), "the race is over too soon");
+            assert_eq!(beside(&race) == waiting, round < ROUNDS_ALONE);
+        }
+        let mut race = settled();
         // Where memory is short, one that only stays gives way to any, and all of them to one that runs, then the largest.
         assert_eq!((race.give_way(count - 1), race.field.len()), (count - 1, count - 1));
         let mut race = settled();
