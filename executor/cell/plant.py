@@ -128,7 +128,7 @@ class _MachineNow:
     holding: Workpiece | None = None
     busy: _Busy | None = None
     breaks_off: _Busy | None = None
-    """The command that it was at when it was stopped, until it has come to rest."""
+    """The command that it was at when it was stopped, until it has come to rest; one that waits will be done."""
     times: dict[str, int] = field(default_factory=dict)
 
 
@@ -236,9 +236,8 @@ class Plant:
                 now = self.machines[machine]
                 if now.busy is busy:
                     yield from self._finish(machine, busy)
-                elif now.breaks_off is busy and self.random.random() < STILL_DONE:
-                    waits = not self._take_effect(machine, busy)
-                    now.breaks_off = replace(busy, waits=waits)
+                elif now.breaks_off is busy and (busy.waits or self._is_still_done()):
+                    now.breaks_off = replace(busy, waits=not self._take_effect(machine, busy))
             case _Press(signal):
                 if self.machines[str(self.model.sensors[signal].acknowledges)].busy is None:
                     self.pressed.add(signal)
@@ -277,8 +276,9 @@ class Plant:
             raise _FaultError(f"{name} does not know the command {busy.command}")
         machine.times[busy.command] = machine.times.get(busy.command, 0) + 1
         if isinstance(action, Stop):
-            if machine.busy is not None and not isinstance(machine.model.commands[machine.busy.command], Stop):
-                machine.breaks_off = machine.busy
+            was = machine.busy
+            if was is not None and not isinstance(machine.model.commands[was.command], Stop):
+                machine.breaks_off = was if not was.waits or self._is_still_done() else replace(was, waits=False)
             machine.busy = busy
             if action.takes_s + action.jitter_s or self._hangs(name, busy):
                 self._take_time(name, busy, action)
@@ -363,6 +363,10 @@ class Plant:
             self.befallen.append((drops, f"{name} drops {held}, as {busy.command} ends"))
             machine.holding = None
         return True
+
+    def _is_still_done(self) -> bool:
+        """Whether what is broken off is done if its time is over before the machine rests; it is asked once."""
+        return self.random.random() < STILL_DONE
 
     def _position(self, machine: _MachineNow, name: str, busy: _Busy, parameter: str) -> str:
         position = busy.parameters.get(parameter)

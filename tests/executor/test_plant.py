@@ -284,6 +284,29 @@ def test_what_a_stop_breaks_off_at_a_full_station_may_still_be_done_when_that_be
     assert seen == {True, False}
 
 
+@pytest.mark.parametrize("draw", [0.9, 0.1], ids=["undone", "done"])
+@pytest.mark.parametrize("stopped_after", [3.5, 4.5], ids=["before it waits", "while it waits"])
+def test_whether_what_is_broken_off_is_still_done_is_drawn_once(stopped_after: float, draw: float) -> None:
+    text = STOPPABLE.replace("takes_s: 4}", "takes_s: 4, when_full: wait}")
+    bench = Bench(text=text.replace("STOP: {does: stop}", "STOP: {does: stop, takes_s: 50}"))
+    bench.load()
+    bench.do("R", "MOVE", to="TABLE")
+    bench.give("B", "RUN")
+    bench.wait(stopped_after)
+    left = [draw]
+    bench.plant.random.random = left.pop  # type: ignore[method-assign]
+    bench.give("B", "STOP")
+    bench.wait(1.5)
+    assert left == []
+    for _ in range(3):  # a machine that waits is woken whenever a station becomes free
+        bench.plant._wake()
+        bench.wait(0.25)
+    assert bench.plant.machines["B"].holding is not None
+    bench.do("R", "GRASP", at="TABLE")
+    assert (bench.plant.stations["table"] is not None) == (draw == 0.1)
+    assert bench.faults == []
+
+
 def test_nobody_comes_to_a_machine_that_is_stopped_at_rest_and_a_machine_that_stops_takes_nothing_else() -> None:
     bench = Bench(text=STOPPABLE)
     bench.give("R", "STOP")
