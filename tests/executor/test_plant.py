@@ -286,7 +286,9 @@ def test_what_a_stop_breaks_off_at_a_full_station_may_still_be_done_when_that_be
 
 @pytest.mark.parametrize("draw", [0.9, 0.1], ids=["undone", "done"])
 @pytest.mark.parametrize("stopped_after", [3.5, 4.5], ids=["before it waits", "while it waits"])
-def test_whether_what_is_broken_off_is_still_done_is_drawn_once(stopped_after: float, draw: float) -> None:
+def test_whether_what_is_broken_off_is_still_done_is_drawn_once(
+    monkeypatch: pytest.MonkeyPatch, stopped_after: float, draw: float
+) -> None:
     text = STOPPABLE.replace("takes_s: 4}", "takes_s: 4, when_full: wait}")
     bench = Bench(text=text.replace("STOP: {does: stop}", "STOP: {does: stop, takes_s: 50}"))
     bench.load()
@@ -294,7 +296,7 @@ def test_whether_what_is_broken_off_is_still_done_is_drawn_once(stopped_after: f
     bench.give("B", "RUN")
     bench.wait(stopped_after)
     left = [draw]
-    bench.plant.random.random = left.pop  # type: ignore[method-assign]
+    monkeypatch.setattr(bench.plant.random, "random", left.pop)
     bench.give("B", "STOP")
     bench.wait(1.5)
     assert left == []
