@@ -54,13 +54,15 @@ struct Racer {
     begun: Option<(Ordered, Saturation, Node)>,
     /// The level that was reached before the last round.
     before: u32,
-    /// How many rounds in succession it has stood where the search in the reverse order stands, if that is before it.
+    /// Whether it has run since twins were last looked for, and not waited.
+    ran: bool,
+    /// For how many rounds in succession it has stood where the search in the reverse order stands, if that is before it.
     alike: u32,
 }
 
 impl Racer {
     fn new(order: Order) -> Self {
-        Racer { order, is_shortest: false, spared: false, begun: None, before: 0, alike: 0 }
+        Racer { order, is_shortest: false, spared: false, begun: None, before: 0, ran: false, alike: 0 }
     }
 
     /// Whether its order is the one that the net came in, from either end.
@@ -101,6 +103,7 @@ impl Racer {
                 none.insert((ordered, search, start))
             }
         };
+        self.ran = true;
         ordered.diagram.store.memory.allow(room);
         let Ordered { diagram, blocks, parts, agendas, .. } = ordered;
         let Some(agenda) = &agendas[By::Forward as usize] else { return Ok(None) };
@@ -110,10 +113,13 @@ impl Racer {
 
 /// Keeps half of the field: in turn who has the fewest rounds to go at the pace of the last one, who has come farthest,
 /// and who has the fewest nodes for it. None of the three alone tells who wins. Of the last two, the first by pace leads,
-/// unless the other has come half as far again. `thinned` counts the times; true where the last two are left, and who
-/// stays beside them.
+/// unless the other has come half as far again. Where memory has left only who is spared, these run for the first places.
+/// `thinned` counts the times; true where the last two are left, and who stays beside them.
 fn thin_out(field: &mut Vec<Racer>, thinned: u32) -> bool {
     let mut spared: Vec<Racer> = field.extract_if(.., |racer| racer.spared).collect();
+    if field.is_empty() {
+        field.extend(spared.drain(..).map(|racer| Racer { spared: false, ..racer }));
+    }
     if thinned == 1 || field.len() > FINALISTS {
         let keep = FINALISTS.max(field.len() / 2);
         let mut kept = Vec::new();
@@ -157,16 +163,20 @@ fn stand_alike(one: &Racer, other: &Racer) -> bool {
     begun && level == other_level && nodes.abs_diff(other_nodes) <= nodes.max(other_nodes) / TWINS_APART
 }
 
-/// Takes out the second of each two that have been twins for long enough.
+/// Takes out the second of each two that have been twins for long enough. Of two that wait, standing still says nothing.
 fn drop_twins(field: &mut Vec<Racer>) {
     for at in (1..field.len()).rev() {
         let Some(twin) = field[..at].iter().find(|first| field[at].is_reverse_of(first)) else { continue };
+        if !(twin.ran && field[at].ran) {
+            continue;
+        }
         let alike = stand_alike(twin, &field[at]);
         field[at].alike = if alike { field[at].alike + 1 } else { 0 };
         if field[at].alike >= ROUNDS_ALIKE && field.len() > FINALISTS {
             field.remove(at);
         }
     }
+    field.iter_mut().for_each(|racer| racer.ran = false);
 }
 
 /// The searches for the markings of one net, each in an order of its own.
@@ -338,6 +348,15 @@ mod tests {
     }
 
     #[test]
+    fn of_two_that_wait_standing_still_makes_no_twins() {
+        let [along, back, across, _] = orders();
+        let (mut racers, transitions) = field(&[along, back, across]);
+        round(&mut racers, &transitions, |_| 200);
+        drop_twins(&mut racers);
+        assert_eq!((racers.len(), racers[1].alike), (3, 1));
+    }
+
+    #[test]
     fn two_orders_that_stand_apart_are_both_kept() {
         let (mut racers, transitions) = field(&orders());
         for _ in 0..4 {
@@ -386,6 +405,16 @@ mod tests {
             let spared: Vec<&Order> = racers.iter().filter(|racer| racer.spared).map(|racer| &racer.order).collect();
             assert_eq!(spared, if thinned < 3 { vec![&along, &back] } else { vec![] });
         }
+    }
+
+    #[test]
+    fn where_memory_has_left_only_who_is_spared_these_run_to_the_end() {
+        let [along, back, ..] = orders();
+        let (mut racers, transitions) = field(&[along, back]);
+        round(&mut racers, &transitions, |at| 200 * (at as u64 + 1));
+        racers.iter_mut().for_each(|racer| racer.spared = true);
+        assert!(thin_out(&mut racers, SPARED_ROUNDS + 1));
+        assert_eq!((racers.len(), running(&racers)), (2, 2));
     }
 
     /// Vehicles that overtake each other on a ring of zones, of which each holds one: all ways to place them.
