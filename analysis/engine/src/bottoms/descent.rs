@@ -253,7 +253,7 @@ mod tests {
     #[test]
     fn what_is_found_without_edges_is_what_pearce_finds() {
         let (mut reversible, mut dead, mut several, mut unknown) = (0, 0, 0, 0);
-        for space in random_spaces(3000, false).filter(|space| space.len() > 8) {
+        for space in random_spaces(1500, false).filter(|space| space.len() > 8) {
             *(match checked(&space) {
                 Some(found) if found.reversible => &mut reversible,
                 Some(found) if found.only => &mut dead,
@@ -262,7 +262,7 @@ mod tests {
             }) += 1;
         }
         assert!(
-            reversible > 500 && dead > 2 && several > 2 && unknown > 500,
+            reversible > 250 && dead > 1 && several > 1 && unknown > 250,
             "{reversible} {dead} {several} {unknown}"
         );
     }
