@@ -48,10 +48,11 @@ demo: $(MADE)/install ## check, prove, bundle and run the one-robot cell, and se
 
 # The type checker works on one processor, and so does the compiler of a crate: side by side they take half as long. The
 # crate is checked and tested while the environment is made, of which the longest is the same crate, optimised as shipped.
-# What make says to its own children (MAKEFLAGS) is kept from cargo, which takes it for an order to wait for make.
+# The tests are compiled there too, once for all workers. What make says to its own children (MAKEFLAGS) is kept from
+# cargo, which takes it for an order to wait for make.
 test: $(MADE)/rust-tools ## lint, format, types, and all tests
 	$(MAKE) --jobs=$(if $(MEANWHILE),3,2) --output-sync=target \
-		$(if $(MEANWHILE),meanwhile) $(MADE)/develop lint-rust test-rust lint-python
+		$(if $(MEANWHILE),meanwhile) $(MADE)/develop lint-rust test-rust lint-python $(MADE)/collected
 	$(MAKE) test-python
 
 meanwhile:
@@ -138,6 +139,11 @@ $(MADE)/install: $(MADE)/venv pyproject.toml $(CRATE)/Cargo.toml $(CRATE)/Cargo.
 
 $(MADE)/develop: $(MADE)/install
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group test --group lint
+	@touch $@
+
+# Each worker would else compile all tests, with their assertions rewritten. What cannot be collected, the tests tell.
+$(MADE)/collected: $(MADE)/develop
+	-$(BIN)/pytest -qq -n 0 --collect-only >/dev/null
 	@touch $@
 
 $(MADE)/mutants: $(MADE)/develop

@@ -7,8 +7,11 @@ cache of `firable check` is off, so that no test is answered by an earlier one.
 A solver says the same of the same text, so it is asked once in a process: most bundles of the tests differ in one line.
 
 Whoever runs the tests in the background has Ctrl-C ignored, and so would all processes that the tests start.
+
+Ten thousand collected tests live to the end. The garbage collector is told so, or it looks at them all again and again.
 """
 
+import gc
 import os
 import signal
 from collections.abc import Iterator
@@ -36,6 +39,11 @@ def asked_once() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(checking, "SOLVERS", {name: lru_cache(512)(ask) for name, ask in SOLVERS.items()})
         yield
+
+
+def pytest_collection_finish() -> None:
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_report_header() -> list[str]:
