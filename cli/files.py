@@ -102,10 +102,27 @@ def journal_files(journal: str) -> tuple[str, ...]:
     return tuple(f"{journal}{suffix}" for suffix in ("", ".cell", ".generation", "-wal", "-shm", "-journal"))
 
 
+def stem(argument: str) -> str:
+    """The name of a net or bundle without its suffix, by which what belongs to it is called.
+
+    >>> stem("cells/cell.firable.yaml"), stem("cell.bundle")
+    ('cells/cell', 'cell')
+    """
+    return argument.removesuffix(next(filter(argument.endswith, NET_FILES), Path(argument).suffix))
+
+
+def _beside(argument: str) -> Iterator[str]:
+    """What stands beside a net or bundle and is found there, unnamed."""
+    for name in (f"{stem(argument)}.plant.yaml", f"{stem(argument)}.layout.yaml", f"{argument}.signatures"):
+        with suppress(OSError, ValueError):  # a name that no file can have
+            if Path(name).is_file():
+                yield name
+
+
 def _read(argument: str) -> Iterable[str]:
-    """The files that are read where a file or `catalogue:NAME` is named."""
+    """The files that are read where a file or `catalogue:NAME` is named, with what is found beside it."""
     if not argument.startswith(CATALOGUE):
-        return (argument,)
+        return (argument, *_beside(argument))
     from firable.nets.catalogue import catalogue_names, catalogue_path
 
     name = argument.removeprefix(CATALOGUE)
@@ -116,7 +133,7 @@ def _read(argument: str) -> Iterable[str]:
 
 def _read_below(argument: str) -> Iterable[str]:
     """The same where a folder stands for the net files below it."""
-    return net_files([argument]) if is_folder(argument) else _read(argument)
+    return [file for net in net_files([argument]) for file in _read(net)]
 
 
 def _written(argument: str) -> Iterable[str]:

@@ -11,7 +11,7 @@ import click
 from click.core import ParameterSource
 
 from firable.cli.choice import OneOf
-from firable.cli.files import CATALOGUE, NET_FILES, READ, WRITTEN, is_folder, nets_below, refuse_to_overwrite
+from firable.cli.files import CATALOGUE, READ, WRITTEN, is_folder, nets_below, refuse_to_overwrite, stem
 from firable.cli.finite import FiniteRange
 from firable.cli.report import Outcome, Report, document, exit_code_of, worst
 
@@ -203,8 +203,7 @@ def plant_for(argument: str, net_name: str) -> str:
 
 
 def _plant_beside(argument: str) -> Path:
-    suffix = next(filter(argument.endswith, NET_FILES), Path(argument).suffix)
-    return Path(f"{argument.removesuffix(suffix)}.plant.yaml")
+    return Path(f"{stem(argument)}.plant.yaml")
 
 
 _OTHER_FILES: Final = {

@@ -165,6 +165,26 @@ def test_no_output_is_written_over_a_net_of_a_folder_that_is_read(
     assert main(["check", ".", "--write", "json", "folder/cell.firable.yaml"]) == 0, "it does not stand there yet"
 
 
+@pytest.mark.parametrize(
+    ("name", "command"),
+    [
+        ("cell.plant.yaml", ("run", "cell.bundle", "--trace")),
+        ("cell.plant.yaml", ("check", ".", "--write", "json")),
+        ("cell.layout.yaml", ("draw", "cell.firable.yaml", "-o")),
+        ("cell.bundle.signatures", ("run", "cell.bundle", "--trace")),
+        ("cell.bundle.signatures", ("verify", "cell.bundle", "--write", "json")),
+    ],
+)
+def test_no_output_is_written_over_what_is_found_beside_a_file_that_is_read(
+    name: str, command: tuple[str, ...], spelled: dict[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = Path(name)
+    file.write_text("mine", encoding="utf-8")
+    assert main([*command, str(Path("folder") / ".." / name)]) == 2
+    assert "would overwrite what the command reads\n" in capsys.readouterr().err
+    assert file.read_text("utf-8") == "mine"
+
+
 def test_what_is_read_of_the_catalogue_are_its_files() -> None:
     plant = catalogue_path("one_robot").with_name("one_robot.plant.yaml")
     assert {*READ.files("catalogue:one_robot")} == {str(catalogue_path("one_robot")), str(plant)}
