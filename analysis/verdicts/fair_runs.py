@@ -21,15 +21,11 @@ from firable.analysis.spaces.space import S, StateSpace
 from firable.nets.net import Fairness
 
 
-def fair_runs(space: StateSpace[S], within: S, fairness: Fairness) -> S:
-    """The markings from which a fair run goes on for ever inside a set, external gates free."""
-    return space.backward(fair_markings(space, within, fairness), within)
-
-
 def fair_markings(space: StateSpace[S], within: S, fairness: Fairness) -> S:
     """The set Y above: those among which a run may go on for ever, and meet each obligation of fairness again.
 
-    Without fairness, all from which a run goes on for ever inside the set.
+    A fair run goes on for ever inside the set from these and from what leads to them there, external gates free.
+    Without fairness they are all from which a run goes on for ever inside the set.
     """
     algebra = space.algebra
     around = space.endless(within)

@@ -23,18 +23,20 @@ cycle, and checks that the cycle closes, that q is never met and that the cycle 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from firable.analysis._engine import BudgetExceeded
 from firable.analysis.compiled import engine_limits
 from firable.analysis.question import Answer, no, yes
 from firable.analysis.spaces.columns import NO_COMPONENT, Column, Components, first, indexes
 from firable.analysis.spaces.reachability import ReachabilityGraph
-from firable.analysis.spaces.space import S, StateSpace, WitnessError
-from firable.analysis.verdicts.fair_runs import fair_runs
+from firable.analysis.spaces.space import S, StateSpace, WitnessError, Witnesses
+from firable.analysis.verdicts.fair_runs import fair_markings
+from firable.analysis.verdicts.unanswered import unanswered
 from firable.nets.formula import Formula, format_formula
 from firable.nets.net import Fairness, Marking, Property
 from firable.semantics.algebra import BOOL
@@ -44,14 +46,17 @@ from firable.semantics.trace import Discipline
 
 Matrix = npt.NDArray[np.bool_]
 """One Boolean for each component and transition."""
+GOING_ON_SHARE = 0.25
+"""The part of the time left that sets may take to go on with a run, which decides nothing any more."""
 
 
 def leads_to(space: StateSpace[Any], of: Property) -> Answer:
     """Decide a `leads_to` property; raises `IncompleteGraph` where the space is not whole.
 
     Cost: one decomposition into components for no and weak fairness; for strong fairness one for each round of pruning.
-    A space that is no reachability graph has no components: there the answer comes from sets (`fair_runs`), and a
-    violation shows the way to where the property fails, but not the run that goes on from there.
+    A space that is no reachability graph has no components: there the answer comes from sets (`fair_runs.py`), and so
+    does the run that goes on without an answer (`unanswered.py`). Where that takes too long, a violation shows the way
+    to where it begins.
     """
     space.require_complete()
     return _by_components(space, of) if isinstance(space, ReachabilityGraph) else _by_sets(space, of)
@@ -60,12 +65,31 @@ def leads_to(space: StateSpace[Any], of: Property) -> Answer:
 def _by_sets(space: StateSpace[S], of: Property) -> Answer:
     algebra = space.algebra
     without = algebra.negation(space.satisfying(_then(of)))
-    for_ever = fair_runs(space, without, of.fairness)
-    stuck = space.backward(algebra.conjunction([space.deadlocks, without]), without)
-    failing = algebra.disjunction([for_ever, stuck])
+    around = fair_markings(space, without, of.fairness)
+    failing = space.backward(algebra.disjunction([around, algebra.conjunction([space.deadlocks, without])]), without)
     end = f"here ({format_formula(of.formula)}) holds, and ({format_formula(_then(of))}) need never come"
     witness = space.witness(algebra.conjunction([space.satisfying(of.formula), without, failing]), end)
-    return yes() if witness is None else no((), witness)
+    if witness is None:
+        return yes()
+    try:
+        with space.turn(GOING_ON_SHARE):
+            whole = unanswered(space, without, around, of.fairness, witness)
+    except BudgetExceeded:
+        whole = None
+    if whole is None:
+        return no((), witness)
+    index = space.net.transition_index
+    prefix, cycle = ([tuple(index[t] for t in fired) for fired in part] for part in (whole.firings, whole.cycle))
+    check_lasso(Witnesses(space.net, space.discipline), of, prefix, len(witness.firings), cycle)
+    return no((), replace(whole, note=_told(of, len(witness.firings), cycle)))
+
+
+def _told(of: Property, prefix_length: int, cycle: list[FiringSet]) -> str:
+    end = "the cycle is fair" if cycle else "the sequence ends in a deadlock"
+    return (
+        f"after firing {prefix_length} of the sequence ({format_formula(of.formula)}) holds, and then "
+        f"({format_formula(_then(of))}) never comes: {end}"
+    )
 
 
 def _then(of: Property) -> Formula:
@@ -75,8 +99,7 @@ def _then(of: Property) -> Formula:
 
 
 def _by_components(graph: ReachabilityGraph, of: Property) -> Answer:
-    then = _then(of)
-    without = ~graph.satisfying(then)
+    without = ~graph.satisfying(_then(of))
     fair = _Fair(graph, of.fairness, without)
     stuck = graph.deadlocks & without
     start = first(graph.satisfying(of.formula) & graph.backward(fair.markings | stuck, without) & without)
@@ -87,12 +110,8 @@ def _by_components(graph: ReachabilityGraph, of: Property) -> Answer:
     tail, entry = _way(graph, start, fair.markings | stuck, without)
     prefix += tail
     cycle = fair.cycle(entry) if not stuck[entry] else []
-    check_lasso(graph, of.formula, then, of.fairness, prefix, prefix_length, cycle)
-    after = f"after firing {prefix_length} of the sequence ({format_formula(of.formula)}) holds, and then "
-    end = f"({format_formula(then)}) never comes: " + (
-        "the cycle is fair" if cycle else "the sequence ends in a deadlock"
-    )
-    return no((), graph.witnesses.named(prefix, graph.marking(entry), cycle, after + end))
+    check_lasso(graph.witnesses, of, prefix, prefix_length, cycle)
+    return no((), graph.witnesses.named(prefix, graph.marking(entry), cycle, _told(of, prefix_length, cycle)))
 
 
 def _way(graph: ReachabilityGraph, source: int, targets: Column, within: Column) -> tuple[list[FiringSet], int]:
@@ -244,29 +263,27 @@ class _Walk:
 
 
 def check_lasso(
-    graph: ReachabilityGraph,
-    p: Formula,
-    q: Formula,
-    fairness: Fairness,
-    prefix: list[FiringSet],
-    trigger: int,
-    cycle: list[FiringSet],
+    witnesses: Witnesses, of: Property, prefix: list[FiringSet], trigger: int, cycle: list[FiringSet]
 ) -> None:
-    """Play prefix and cycle by the reference player; raises `WitnessError` unless they refute p leads to q."""
-    player = graph.witnesses.player
+    """Play prefix and cycle by the reference player; raises `WitnessError` unless they refute the property.
+
+    After `trigger` of the prefix p holds, and q does not from there on.
+    """
+    net, player = witnesses.net, witnesses.player
 
     def holds(formula: Formula, marking: Marking) -> bool:
-        return evaluate(BOOL, graph.net, formula, holds_in(marking))
+        return evaluate(BOOL, net, formula, holds_in(marking))
 
     def played(marking: Marking, firings: Iterable[FiringSet]) -> list[Marking]:
         markings = [marking]
         for fired in firings:
-            markings.append(graph.witnesses.play(markings[-1], [fired]))
+            markings.append(witnesses.play(markings[-1], [fired]))
         return markings
 
-    before = played(graph.net.initial_marking, prefix)
+    before = played(net.initial_marking, prefix)
     around = played(before[-1], cycle)
-    if not holds(p, before[trigger]) or any(holds(q, marking) for marking in (*before[trigger:], *around)):
+    answered = any(holds(_then(of), marking) for marking in (*before[trigger:], *around))
+    if answered or not holds(of.formula, before[trigger]):
         raise WitnessError("the lasso does not refute the property")
     if not cycle:
         if not player.deadlocked(before[-1]):
@@ -277,9 +294,9 @@ def check_lasso(
     fired = {t for label in cycle for t in label}
     enabled = [set(player.may_fire(marking)) for marking in around[:-1]]
     owed: set[int] = set()
-    if fairness is Fairness.WEAK:
+    if of.fairness is Fairness.WEAK:
         owed = set.intersection(*enabled)
-    elif fairness is Fairness.STRONG:
+    elif of.fairness is Fairness.STRONG:
         owed = set.union(*enabled)
     if not owed <= fired:
         raise WitnessError("the cycle is not fair")

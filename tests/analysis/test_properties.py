@@ -265,7 +265,8 @@ def test_a_lasso_that_refutes_nothing_is_an_internal_error() -> None:
     def lasso(prefix: str, cycle: str, *, trigger: int = 1, fairness: Fairness = Fairness.STRONG, q: str = "e") -> None:
         before: list[FiringSet] = [(index[name],) for name in prefix.split()]
         around: list[FiringSet] = [(index[name],) for name in cycle.split()]
-        check_lasso(graph, parse_formula("p"), parse_formula(q), fairness, before, trigger, around)
+        of = prop(PropertyKind.LEADS_TO, parse_formula("p"), parse_formula(q), fairness)
+        check_lasso(graph.witnesses, of, before, trigger, around)
 
     lasso("into", "u w w2 r")
     lasso("into", "u r", fairness=Fairness.WEAK)

@@ -43,11 +43,12 @@ from firable.analysis.evidence.producing.runs import (
 )
 from firable.analysis.evidence.producing.spaces import MARKINGS_MAX, WIDE_MAX, Spaces
 from firable.analysis.evidence.producing.theorems import theorem_on
-from firable.analysis.evidence.producing.unanswered import unanswered
 from firable.analysis.evidence.producing.unfolding import unfolded_markings
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.spaces.reachability import ReachabilityGraph
 from firable.analysis.spaces.space import StateSpace
+from firable.analysis.verdicts.fair_runs import fair_markings
+from firable.analysis.verdicts.unanswered import unanswered
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import Firable, Formula
 from firable.nets.net import Marking, Net
@@ -152,9 +153,12 @@ class Certifier:
         """The run of the witness, gone on with where it does not go on for ever and may."""
         if witness.cycle or Player(self.net).deadlocked(self.net.marking(witness.marking)):
             return FiringSequence(witness.firings, witness.cycle)
-        if self.spaces.asked is None:
+        if (space := self.spaces.asked) is None:
             raise LackingError("there are too many markings to find the run that goes on without an answer")
-        return unanswered(self.spaces.asked, claim, witness)
+        without = space.algebra.negation(space.satisfying(claim.then))
+        around = fair_markings(space, without, claim.fairness)
+        whole = unanswered(space, without, around, claim.fairness, witness)
+        return None if whole is None else FiringSequence(whole.firings, whole.cycle)
 
     def _unordered(self, witness: Witness) -> FiringSequence | None:
         """The run, with the step after it that has no order."""

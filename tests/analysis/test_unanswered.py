@@ -1,8 +1,9 @@
-"""A run in which an answer never comes, from a space of sets that tells only the way to where it begins."""
+"""A run in which an answer never comes, from a space of sets, which tells at first only the way to where it begins."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, Never
 
 import pytest
 from hypothesis import given
@@ -13,14 +14,14 @@ from support.naive_space import NaiveSpace
 from support.ring_nets import ring_nets
 from support.whole_nets import formulas
 
+from firable.analysis._engine import BudgetExceeded
 from firable.analysis.check import check
-from firable.analysis.evidence.certificate import Certificate
+from firable.analysis.evidence.certificate import Certificate, FiringSequence
 from firable.analysis.evidence.checking.checker import check_document, check_evidence
 from firable.analysis.evidence.checking.obligation import Evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.analysis.evidence.producing.claims import Certifier
 from firable.analysis.evidence.producing.producer import evidence_of_report
-from firable.analysis.evidence.producing.unanswered import unanswered
 from firable.analysis.goal import Limits
 from firable.analysis.spaces.space import StateSpace
 from firable.analysis.spaces.symbolic import explore_symbolically
@@ -68,9 +69,20 @@ ANSWERED = Net(
 )
 def test_a_response_that_a_diagram_refutes_has_a_run_that_is_fair_and_never_answers(net: Net) -> None:
     report = check(net, method="symbolic")
-    assert report.verdict("property.asked").status is Status.VIOLATED
+    verdict = report.verdict("property.asked")
+    assert verdict.status is Status.VIOLATED
+    assert verdict.witness is not None
+    assert verdict.witness.cycle
+    assert verdict.witness.note.endswith("never comes: the cycle is fair")
     checked = check_document(evidence_of_report(report))
     assert next(one for one in checked if one.record.name == "property.asked").shown
+
+
+def raising(error: Exception) -> Callable[..., Never]:
+    def fail(*_: object) -> Never:
+        raise error
+
+    return fail
 
 
 @st.composite
@@ -90,8 +102,7 @@ def test_a_run_is_gone_on_with_through_the_sets_of_any_space(
     assert of.then is not None
     claim = Claim(ClaimKind.NOT_LEADS_TO, of.formula, of.then, of.fairness)
 
-    def is_shown(run: Certificate | None) -> bool:
-        assert run is not None
+    def is_shown(run: Certificate) -> bool:
         return check_evidence(Evidence(net, discipline, claim, run)).shown is True
 
     spaces: list[StateSpace[Any]] = [NaiveSpace(net, discipline)]
@@ -100,5 +111,22 @@ def test_a_run_is_gone_on_with_through_the_sets_of_any_space(
     for space in spaces:
         witness = leads_to(space, of).witness
         if witness is not None:
-            assert is_shown(unanswered(space, claim, witness))
-            assert is_shown(Certifier(net, discipline, Limits()).certify(claim, witness))
+            assert is_shown(FiringSequence(witness.firings, witness.cycle))
+
+
+@pytest.mark.parametrize("net", [asked(UNFAIR, Start(), Holds("p2"), fairness) for fairness in Fairness])
+def test_where_there_was_no_time_to_go_on_the_evidence_does(net: Net, monkeypatch: pytest.MonkeyPatch) -> None:
+    (of,), space = net.properties, explore_symbolically(net, Limits())
+    assert isinstance(of, Property)
+    whole = leads_to(space, of).witness
+    with monkeypatch.context() as patch:
+        patch.setattr("firable.analysis.verdicts.leads_to.unanswered", raising(BudgetExceeded("no time")))
+        begun = leads_to(space, of).witness
+    assert whole is not None
+    assert begun is not None
+    assert begun.note == "here (start) holds, and (p2) need never come"
+    assert (begun.firings, begun.cycle) == (whole.firings[: len(begun.firings)], ())
+    assert of.then is not None
+    claim = Claim(ClaimKind.NOT_LEADS_TO, of.formula, of.then, of.fairness)
+    run = Certifier(net, Discipline.INTERLEAVING, Limits()).certify(claim, begun)
+    assert run == FiringSequence(whole.firings, whole.cycle)

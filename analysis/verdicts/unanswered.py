@@ -1,48 +1,42 @@
-"""A run in which an answer never comes, gone on with through sets of markings: material for evidence.
+"""A run in which an answer never comes, gone on with through sets of markings, for any state space.
 
-A decision diagram tells of a response that fails the way to where the answer need no longer come, and not the run that
-goes on from there. That run ends in a deadlock, or goes round for ever in a set of markings without the answer in which
-a fair run may always go on (`fair_runs`). There it meets one obligation of fairness after the other: it goes on to the
-nearest marking where a transition that it owes may fire, or, where fairness is weak, may not fire. Then it goes home to
-where its round began. What can not be met, or no way home, says that the run has left the component of the markings
-where it began, and the round begins anew: a finite net has finitely many components behind each other.
+Sets tell of a response that fails the way to where the answer need no longer come, and not the run that goes on from
+there. That run ends in a deadlock, or goes round for ever in a set of markings without the answer in which a fair run
+may always go on (`fair_markings`). There it meets one obligation of fairness after the other: it goes on to the nearest
+marking where a transition that it owes may fire, or, where fairness is weak, may not fire. Then it goes home to where
+its round began. What can not be met, or no way home, says that the run has left the component of the markings where it
+began, and the round begins anew: a finite net has finitely many components behind each other.
 
 Rejected: the first successor of each marking, which may be the answer and need not be fair.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
-from firable.analysis.evidence.certificate import FiringSequence
-from firable.analysis.evidence.claims import Claim, is_marking
-from firable.analysis.spaces.space import StateSpace
-from firable.analysis.verdicts.fair_runs import fair_markings
+from firable.analysis.spaces.space import S, StateSpace, Witnesses
 from firable.nets.net import Fairness, Marking
 from firable.nets.verdict import Witness
 from firable.semantics.player import FiringSet, Player
 from firable.semantics.trace import Discipline
 
 
-def unanswered(space: StateSpace[Any], claim: Claim, witness: Witness) -> FiringSequence | None:
-    """The run of a witness, gone on with to a deadlock or round a fair cycle, without the answer; None without one."""
+def unanswered(space: StateSpace[S], without: S, around: S, fairness: Fairness, witness: Witness) -> Witness | None:
+    """The run of a witness, gone on with to a deadlock or round a fair cycle; None where there is no way to either.
+
+    It stays in `without`, the markings without the answer, and `around` are the `fair_markings` of these.
+    """
     algebra = space.algebra
-    without = algebra.negation(space.satisfying(claim.then))
-    around = fair_markings(space, without, claim.fairness)
     stuck = algebra.conjunction([space.deadlocks, without])
     walk = _Walk(space, space.net.marking(witness.marking))
     if not walk.go(algebra.disjunction([around, stuck]), without):
         return None
-    prefix, rounds = walk.fired, list[list[FiringSet]]()
-    if space.contains(around, walk.at):
-        rounds = _rounds(walk, around, claim.fairness)
-    *before, cycle = rounds or [[]]
-    names = space.net.transitions
-    first, last = (
-        tuple(tuple(names[t].name for t in fired) for fired in part)
-        for part in ([*prefix, *(fired for part in before for fired in part)], cycle)
-    )
-    return FiringSequence((*witness.firings, *first), last)
+    *before, cycle = _rounds(walk, around, fairness) if space.contains(around, walk.at) else [[]]
+    prefix = [*walk.fired, *(fired for part in before for fired in part)]
+    witnesses = Witnesses(space.net, space.discipline)
+    further = witnesses.named(prefix, witnesses.play(space.net.marking(witness.marking), prefix), cycle)
+    return replace(further, firings=(*witness.firings, *further.firings))
 
 
 def _rounds(walk: _Walk, around: Any, fairness: Fairness) -> list[list[FiringSet]]:
@@ -51,7 +45,7 @@ def _rounds(walk: _Walk, around: Any, fairness: Fairness) -> list[list[FiringSet
     while True:
         walk = _Walk(space, walk.at)
         rounds.append(walk.fired)
-        home = space.satisfying(is_marking(space.net, walk.at))
+        home = space.alone(walk.at)
         walk.fire(around)
         while True:
             t = walk.owed(fairness)
