@@ -100,7 +100,8 @@ class _Reader:
 
     def _tokens(self, text: str) -> Iterator[str]:
         position, depth, before = 0, 0, ""
-        while position < len(text.removesuffix("\n")):
+        end = len(text.removesuffix("\n"))
+        while position < end:
             found = _TOKEN.match(text, position)
             if found is None or not _is_laid_out(before, found[1], found[2], depth):
                 raise ReadingError(f"nothing may be written as {text[position : position + 20]!r}")
