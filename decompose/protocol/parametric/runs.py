@@ -300,7 +300,7 @@ def _facts(stage: _Stage) -> Iterator[Formula]:
 
 
 def _smallest(text: str, facts: int) -> frozenset[str] | None:
-    """The observations that hold in a model with as few facts as leaving out one after the other gets to."""
+    """The observations that hold in a model of which no fact can be left out."""
     solver = z3.Solver(ctx=z3.Context())
     solver.set("random_seed", SEED)
     solver.from_string(text)
@@ -311,7 +311,8 @@ def _smallest(text: str, facts: int) -> frozenset[str] | None:
         if f"fact-{number}" not in model:
             continue
         solver.push()
-        solver.add(z3.Not(z3.Bool(f"fact-{number}", solver.ctx)))
+        gone = (n for n in range(facts) if n == number or f"fact-{n}" not in model)  # none of them comes back
+        solver.add([z3.Not(z3.Bool(f"fact-{n}", solver.ctx)) for n in gone])
         smaller = _holding(solver)
         if smaller is None:
             solver.pop()
