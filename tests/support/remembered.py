@@ -1,7 +1,7 @@
 """Documents, answers of the second solver and findings of the checker that many mutants share, found once a process."""
 
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, lru_cache
 
 from firable.analysis.evidence.checking.checker import CheckedRecord, check_document
 from firable.analysis.evidence.document import Document, document_from_text
@@ -10,7 +10,7 @@ from firable.decompose.verification.solvers import by_cvc5
 _found: dict[tuple[str, int], tuple[CheckedRecord, ...]] = {}
 
 
-@cache
+@lru_cache(512)
 def answered(text: str, timeout_ms: int) -> tuple[str, ...]:
     """What cvc5 answers to a text."""
     return by_cvc5(text, timeout_ms)
