@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import reduce
-from operator import and_, or_, xor
+from operator import and_, not_, or_, xor
 from typing import Final, Generic, Protocol, TypeVar
 
 B = TypeVar("B")
@@ -59,5 +59,13 @@ class Bitwise(Generic[B]):
         return result
 
 
-BOOL: Final[Bitwise[bool]] = Bitwise(true=True, false=False)
+class Booleans:
+    """The algebra of Python's own Booleans, which looks no further once the value is known."""
+
+    conjunction = staticmethod(all)
+    disjunction = staticmethod(any)
+    negation = staticmethod(not_)
+
+
+BOOL: Final = Booleans()
 """Python's own Booleans."""

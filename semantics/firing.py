@@ -10,6 +10,7 @@ a marking is: a bit mask, a row of columns, a list of solver variables.
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import chain
 from typing import TypeVar
 
 from firable.nets.net import Net
@@ -37,11 +38,11 @@ def gates_and_inputs(algebra: BooleanAlgebra[B], net: Net, t: int, holds: Valuat
     # `map`, and no generator, here and below: all that is played in Python comes by here for each transition.
     transition, index = net.transitions[t], net.place_index.__getitem__
     return algebra.conjunction(
-        [
-            *map(holds, map(index, transition.inputs)),
-            *map(holds, map(index, transition.permissive)),
-            *map(algebra.negation, map(holds, map(index, transition.inhibitive))),
-        ]
+        chain(
+            map(holds, map(index, transition.inputs)),
+            map(holds, map(index, transition.permissive)),
+            map(algebra.negation, map(holds, map(index, transition.inhibitive))),
+        )
     )
 
 
