@@ -43,7 +43,6 @@ def remembering(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, int], tuple[s
 
     The same of what must be proved of one protocol, as stated anew, and of reading a document.
     """
-    monkeypatch.setattr("firable.decompose.verification.checking.SOLVERS", {"cvc5": answered})
     monkeypatch.setattr(documents, "document_from_text", read)
     monkeypatch.setattr(documents, "check_document", examined)
     monkeypatch.setattr(documents, "obligations", lambda *_, **__: ())

@@ -8,6 +8,7 @@ import pytest
 from support.bench_cell import PLANT as BENCH
 from support.bundle_mutants import evidence_mutants, verdict_mutants
 from support.examples import some
+from support.remembered import answered, read
 
 from firable.analysis.check import check
 from firable.analysis.evidence.document import Document, Record, document_from_text
@@ -15,7 +16,7 @@ from firable.analysis.goal import Limits
 from firable.decompose.bundling import make_bundle
 from firable.decompose.proofs.closed_loops import sealed_loops
 from firable.decompose.splitting.cut import split
-from firable.decompose.verification import machines, same_loop
+from firable.decompose.verification import documents, machines, same_loop
 from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.checking import check_bundle
 from firable.decompose.verification.documents import ShownRecord, checked_document
@@ -30,7 +31,7 @@ from firable.decompose.verification.machines import (
 )
 from firable.decompose.verification.recut import Cut
 from firable.decompose.verification.refusal import NotShownError
-from firable.decompose.verification.solvers import Answers, by_cvc5
+from firable.decompose.verification.solvers import Answers
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.diagnostics import InputError
@@ -62,7 +63,7 @@ _CLOSED: dict[tuple[str, Faults, Sending], ClosedLoop] = {}
 
 @pytest.fixture
 def remembering(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is found of one document, and of one loop, is found once."""
+    """What is read as a document, found of one, and of one loop, is found once."""
 
     def document(examination: Examination, file: str, net: Net, answers: Answers, timeout_ms: int) -> list[ShownRecord]:
         key = examination.text(file), net_digest(net)
@@ -81,6 +82,7 @@ def remembering(monkeypatch: pytest.MonkeyPatch) -> None:
             _CLOSED[key] = close(net, model, faults, sending)
         return _CLOSED[key]
 
+    monkeypatch.setattr(documents, "document_from_text", read)
     monkeypatch.setattr(machines, "checked_document", document)
     monkeypatch.setattr(machines, "close", loop)
 
@@ -95,7 +97,7 @@ def refused(bundle: Bundle) -> bool:
     """Whether what is said of the machines is refused, or something about them is left to nobody."""
     try:
         examination = Examination(bundle)
-        check_machines(examination, Cut(bundle.net), by_cvc5, TIMEOUT_MS)
+        check_machines(examination, Cut(bundle.net), answered, TIMEOUT_MS)
     except NotShownError:
         return True
     theirs = {verdict.name for verdict in bundle.verdicts if verdict.name.startswith(PREFIXES)}
@@ -139,7 +141,7 @@ def test_every_single_change_of_a_verdict_on_the_machines_is_refused() -> None:
         (how, make) for how, make in verdict_mutants(bundle) if how.removeprefix("verdict ").startswith(PREFIXES)
     ]
     assert len(mutants) > 300
-    for how, make in some(mutants, 4):
+    for how, make in some(mutants, 6):
         try:
             mutant = make()
         except (InputError, ValueError):
@@ -257,7 +259,7 @@ def test_what_rests_on_a_loss_that_could_not_be_checked_in_time_is_only_claimed(
     verdicts, files = sealed_loops(decomposition, BENCH, Limits)
     assert [v.subjects for v in verdicts if v.name == "loop.live"] == [("warm",)]
     cut, examination = Cut(net), Examination(Bundle(decomposition, verdicts, files))
-    check_machines(examination, cut, by_cvc5, TIMEOUT_MS)
+    check_machines(examination, cut, answered, TIMEOUT_MS)
     assert all(one.shown for one in examination.checked.values())
     key = files[LOOP], net_digest(document_from_text(files[LOOP]).net)
     found = _KNOWN[key]
@@ -266,7 +268,7 @@ def test_what_rests_on_a_loss_that_could_not_be_checked_in_time_is_only_claimed(
         one if one.record.proved else replace(one, shown=False, only_claimed="the time was over") for one in found
     ]
     examination = Examination(examination.bundle)
-    check_machines(examination, cut, by_cvc5, TIMEOUT_MS)
+    check_machines(examination, cut, answered, TIMEOUT_MS)
     of_faults = [one for name, one in examination.checked.items() if name.startswith("fault.")]
     assert {one.only_claimed for one in of_faults} == {"it rests on 'loop.live', which is not shown"}
     assert examination.checked["loop.live"].only_claimed == "the time was over"

@@ -18,6 +18,7 @@ from support.layered_nets import cells_in_a_line
 from support.looping_nets import looping_net
 from support.outage_nets import gated, overtaken
 from support.owned_nets import owned_net
+from support.remembered import answered
 
 from firable.analysis.evidence.document import Document, document_from_text
 from firable.decompose.protocol.bereft import Bereft, deaths
@@ -38,7 +39,6 @@ from firable.decompose.verification.outage_obligations import OutageObligations
 from firable.decompose.verification.outages import check_outages
 from firable.decompose.verification.recut import Cut
 from firable.decompose.verification.refusal import NotShownError
-from firable.decompose.verification.solvers import by_cvc5
 from firable.decompose.verification.voting import Voting
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net
@@ -60,12 +60,6 @@ def bundled(make: Callable[[], Net]) -> Bundle:
     return Bundle(decomposition, (*run, *verdicts), {**proofs, **files})
 
 
-@cache
-def asked(text: str, timeout_ms: int) -> tuple[str, ...]:
-    """What cvc5 says to a file, asked once."""
-    return by_cvc5(text, timeout_ms)
-
-
 @pytest.fixture(autouse=True)
 def remembering(monkeypatch: pytest.MonkeyPatch) -> None:
     """A document is read once, what the checker says of it is found once, and the solver is not asked again."""
@@ -76,8 +70,8 @@ def remembering(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def examined(bundle: Bundle) -> Examination:
     examination, cut = Examination(bundle), Cut(bundle.net)
-    check_explored(examination, cut, "cvc5", asked, TIMEOUT_MS)
-    check_outages(examination, cut, asked, TIMEOUT_MS)
+    check_explored(examination, cut, "cvc5", answered, TIMEOUT_MS)
+    check_outages(examination, cut, answered, TIMEOUT_MS)
     return examination
 
 
@@ -340,11 +334,16 @@ def test_what_is_shown_of_the_protocol_in_which_every_part_promises_shows_nothin
     verdicts, files = sealed_outages(decomposition)
     bundle, cut = Bundle(decomposition, verdicts, files), Cut(decomposition.net)
     examination = Examination(bundle)
-    check_outages(examination, cut, asked, TIMEOUT_MS)
+    check_outages(examination, cut, answered, TIMEOUT_MS)
     assert [one.shown for one in examination.checked.values()] == [True, True, True]
     promising = prove_of_the_dead(split(chute()), TIMEOUT_MS).text
     with pytest.raises(NotShownError, match=r"dead\.smt2"):
-        check_outages(Examination(replace(bundle, evidence={**files, "dead.smt2": promising})), cut, asked, TIMEOUT_MS)
+        check_outages(
+            Examination(replace(bundle, evidence={**files, "dead.smt2": promising})),
+            cut,
+            answered,
+            TIMEOUT_MS,
+        )
 
 
 def test_steps_that_leave_no_less_to_be_done_leave_nobody_shown(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -356,13 +355,13 @@ def test_steps_that_leave_no_less_to_be_done_leave_nobody_shown(monkeypatch: pyt
 
 def test_a_step_that_the_solver_gives_up_leaves_nobody_shown() -> None:
     def tired(text: str, timeout_ms: int) -> tuple[str, ...]:
-        said = list(asked(text, timeout_ms))
+        said = list(answered(text, timeout_ms))
         if "at-once.dead.a" in said:
             said[said.index("homeward.restart/a") + 1] = "unknown"
         return tuple(said)
 
     examination, cut = Examination(bundled(gated)), Cut(bundled(gated).net)
-    check_explored(examination, cut, "cvc5", asked, TIMEOUT_MS)
+    check_explored(examination, cut, "cvc5", answered, TIMEOUT_MS)
     check_outages(examination, cut, tired, TIMEOUT_MS)
     dead = {one.name for one in bundled(gated).verdicts if one.name.startswith(PREFIX)}
     assert {name for name, one in examination.checked.items() if not one.shown} == dead
@@ -373,32 +372,32 @@ def test_every_change_of_a_line_that_ties_them_is_refused(monkeypatch: pytest.Mo
     cut = Cut(bundle.net)
     once = stated(bundle.decomposition)
     monkeypatch.setattr(checked_outages, "OutageObligations", lambda *_: once)
-    check_outages(Examination(bundle), cut, asked, TIMEOUT_MS)
+    check_outages(Examination(bundle), cut, answered, TIMEOUT_MS)
     for _, changed in line_mutants(bundle.evidence["dead.smt2"]):
         count += 1
         mutant = replace(bundle, evidence={**bundle.evidence, "dead.smt2": changed})
         with pytest.raises(NotShownError, match=r"dead\.smt2"):
-            check_outages(Examination(mutant), cut, asked, TIMEOUT_MS)
+            check_outages(Examination(mutant), cut, answered, TIMEOUT_MS)
     assert count > 500
 
 
 def test_an_obligation_on_one_who_is_dead_that_the_solver_gives_up_leaves_the_others_shown() -> None:
     def tired(text: str, timeout_ms: int) -> tuple[str, ...]:
-        said = list(asked(text, timeout_ms))
+        said = list(answered(text, timeout_ms))
         if "at-once.dead.a" in said:
             said[said.index("at-once.dead.a") + 1] = "unknown"
         return tuple(said)
 
     bundle = bundled(gated)
     examination, cut = Examination(bundle), Cut(bundle.net)
-    check_explored(examination, cut, "cvc5", asked, TIMEOUT_MS)
+    check_explored(examination, cut, "cvc5", answered, TIMEOUT_MS)
     check_outages(examination, cut, tired, TIMEOUT_MS)
     assert [name for name, one in examination.checked.items() if not one.shown] == ["faults.dead.a"]
 
 
 def refuting(text: str, timeout_ms: int) -> tuple[str, ...]:
     """cvc5, to which `at-once.dead.a` does not hold."""
-    said = list(asked(text, timeout_ms))
+    said = list(answered(text, timeout_ms))
     if "at-once.dead.a" in said:
         said[said.index("at-once.dead.a") + 1] = "sat"
     return tuple(said)

@@ -1,8 +1,11 @@
 """cvc5, the solver that shares nothing with the one of the product."""
 
+from functools import lru_cache
+
 import cvc5
 
 
+@lru_cache(64)
 def by_cvc5(text: str) -> str:
     """What cvc5 answers to an SMT-LIB 2 file."""
     solver = cvc5.Solver()
