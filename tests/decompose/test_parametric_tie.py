@@ -16,6 +16,7 @@ from functools import cache
 
 import pytest
 from support.abstraction import broken, differences, explain, net_structure, of_coordinators, with_relations
+from support.examples import FACTOR
 from support.finite_structures import Structure, Thing
 from support.free_parts import GATE_CLOSED, OUTPUT_READ, freed, parts_of
 from support.reference import load_net
@@ -194,7 +195,7 @@ def tell(variant: Variant, faults: Faults, of: str | Decomposition, markings_max
 # Nets whose protocol net is explored whole, and others, of which the first markings are.
 WHOLE = ["ring", "local_gate"]
 BEGUN = ["remote_gate", "local_conflict", "read_before_order"]
-BEGUN_MAX = 700
+BEGUN_MAX = 350 if FACTOR == 1 else 700
 
 
 @pytest.mark.parametrize("name", WHOLE)
@@ -206,12 +207,14 @@ def test_each_firing_of_the_protocol_net_is_some_actions_of_the_proof(name: str)
     assert set(told.actions) == {action.name for action in PROVED.actions} - without
 
 
+@pytest.mark.seeds
 @pytest.mark.parametrize("name", BEGUN)
 def test_first_firings_of_larger_protocol_nets_are_some_actions_of_the_proof(name: str) -> None:
     told, _ = tell(PROTOCOL, NO_FAULTS, name, BEGUN_MAX)
     assert told.actions["promise"] > 0
 
 
+@pytest.mark.seeds
 @pytest.mark.parametrize("name", [*WHOLE, *BEGUN])
 def test_firings_with_faults_are_some_actions_of_the_proof(name: str) -> None:
     told, _ = tell(PROTOCOL, ONE_OF_EACH, name, BEGUN_MAX)
@@ -249,6 +252,7 @@ def test_each_firing_of_the_protocol_net_with_free_parts_is_some_actions_of_the_
     assert {"stand", "apply-free", "decide", "note", "close"} <= set(told.actions)
 
 
+@pytest.mark.seeds
 @pytest.mark.parametrize("faults", [NO_FAULTS, ONE_OF_EACH], ids=["no fault", "one of each"])
 @pytest.mark.parametrize("name", [*WITH_FREE, *WITH_FREE_BEGUN])
 def test_first_firings_with_free_parts_and_faults_are_some_actions_of_the_proof(name: str, faults: Faults) -> None:

@@ -29,7 +29,7 @@ def is_shown(archive: bytes, n_verdicts: int) -> bool:
 
 @pytest.mark.seeds
 @pytest.mark.usefixtures("remembering")
-@pytest.mark.parametrize(("name", "count"), [("conceptual_one_robot", 200), ("one_robot", 40)])
+@pytest.mark.parametrize(("name", "count"), [("conceptual_one_robot", 100), ("one_robot", 20)])
 def test_a_file_of_a_bundle_that_is_changed_at_random_is_refused(name: str, count: int) -> None:
     bundle = bundled(name)
     assert is_shown(bundle.to_bytes(), len(bundle.verdicts))

@@ -46,7 +46,7 @@ def test_the_same_net_gives_the_same_picture() -> None:
     assert draw_net(net) == draw_net(net)
 
 
-@examples(50)
+@examples(25)
 @given(whole_nets())
 def test_no_arc_passes_through_a_place_or_a_bar_that_it_does_not_join(net: Net) -> None:
     ET.fromstring(draw_net(net))
@@ -63,7 +63,7 @@ def test_no_arc_passes_through_a_place_or_a_bar_that_it_does_not_join(net: Net) 
                 assert not any(start - 2 < edge.x < end + 2 for start, end in other_bar.segments)
 
 
-@examples(50)
+@examples(25)
 @given(whole_nets())
 def test_places_and_bars_never_overlap_and_stay_in_their_lanes(net: Net) -> None:
     where = layout(net)
