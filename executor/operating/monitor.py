@@ -28,7 +28,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 from firable.executor.operating.watched_loop import REMEMBERED, Move, WatchedLoop, Work
 from firable.nets.machines.plant_file import PlantModel
@@ -68,8 +68,7 @@ class Divergence:
         return f"{self.message}{touched}"
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class _Demand:
+class _Demand(NamedTuple):
     """The command of a place must be done, or a signal taken, by a time."""
 
     due_seconds: float
@@ -160,7 +159,7 @@ class Monitor:
         self.taken[s] = value
         if not value and any(place.completion == name for place in self.net.places):
             # The command that clears it follows; until then the bit differs from what was taken, and not for long.
-            self.belief = {m: (*since[:s], at_seconds, *since[s + 1 :]) for m, since in self.belief.items()}
+            self.belief = {m: _changed_at(since, (s,), at_seconds) for m, since in self.belief.items()}
             return None
         bit, means = self.loop.shown[s]
         believed = self._closed(self.belief, at_seconds)
@@ -203,7 +202,8 @@ class Monitor:
         for marking, since in self._closed(self.belief, at_seconds).items():
             for move in moves:
                 if move.firable(marking):
-                    self._add(believed, *self._after(marking, since, move, at_seconds))
+                    stamps = _changed_at(since, self.loop.timed_by(move), at_seconds)
+                    self._add(believed, marking ^ move.flips, stamps)
         return self._believe(believed, at_seconds, subject, message, places)
 
     def _believe(
@@ -217,23 +217,16 @@ class Monitor:
 
     def _closed(self, belief: Mapping[Marking, tuple[float, ...]], at_seconds: float) -> _Belief:
         """The belief with everything that may have happened hidden, as late as it can have."""
-        closed, open_ = dict(belief), list(belief)
+        closed, open_ = dict(belief), dict.fromkeys(belief)
         while open_:
-            marking = open_.pop()
+            marking, _ = open_.popitem()
             since = closed[marking]
-            for move in self.loop.hidden_in(marking):
-                after, stamps = self._after(marking, since, move, at_seconds)
-                if self._add(closed, after, stamps):
-                    open_.append(after)
+            for changed, afters in self.loop.hidden_in(marking):
+                stamps = _changed_at(since, changed, at_seconds)
+                for after in afters:
+                    if closed.get(after) != stamps and self._add(closed, after, stamps):
+                        open_[after] = None
         return closed
-
-    def _after(
-        self, marking: Marking, since: tuple[float, ...], move: Move, at_seconds: float
-    ) -> tuple[Marking, tuple[float, ...]]:
-        stamps = since
-        for s in self.loop.timed_by(move):
-            stamps = (*stamps[:s], at_seconds, *stamps[s + 1 :])
-        return marking ^ move.flips, stamps
 
     @staticmethod
     def _add(belief: _Belief, marking: Marking, since: tuple[float, ...]) -> bool:
@@ -305,6 +298,13 @@ class Monitor:
 
     def _with_token(self, places: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(name for name in places if self.marking >> self.net.place_index[name] & 1)
+
+
+def _changed_at(since: tuple[float, ...], changed: Iterable[int], at_seconds: float) -> tuple[float, ...]:
+    """The times with those of some indexes replaced."""
+    for s in changed:
+        since = (*since[:s], at_seconds, *since[s + 1 :])
+    return since
 
 
 def watch(monitor: Monitor, trace: Trace) -> Divergence | None:

@@ -55,6 +55,10 @@ class Work:
     """The place that says that the target is empty, if the command waits for it; no bit where it does not wait."""
 
 
+Hidden = list[tuple[tuple[int, ...], tuple[Marking, ...]]]
+"""The markings that hidden moves lead to, by the indexes in `WatchedLoop.timed` of the places that these change."""
+
+
 class WatchedLoop:
     """The loop of a net and the machines of a plant; raises `InputError` F5003 where they do not fit."""
 
@@ -90,21 +94,26 @@ class WatchedLoop:
         waited = dict.fromkeys(work.waits_while_empty for work in self.work.values() if work.waits_while_empty)
         self.timed = (*(bit for bit, _ in self.shown), *waited)
         """The places of which it is kept when they last changed: those of the signals, then those waited for."""
-        self._hidden_in: dict[Marking, list[Move]] = {}
-        self._timed_by: dict[Marking, list[int]] = {}
+        self._hidden_in: dict[Marking, Hidden] = {}
+        self._timed_by: dict[Marking, tuple[int, ...]] = {}
 
-    def hidden_in(self, marking: Marking) -> list[Move]:
+    def hidden_in(self, marking: Marking) -> Hidden:
         """What may happen hidden in a marking."""
-        if (moves := self._hidden_in.get(marking)) is None:
+        if (known := self._hidden_in.get(marking)) is None:
             if len(self._hidden_in) >= REMEMBERED:
                 self._hidden_in.clear()
-            moves = self._hidden_in[marking] = [move for move in self.hidden if move.firable(marking)]
-        return moves
+            afters: dict[tuple[int, ...], dict[Marking, None]] = {}
+            for move in self.hidden:
+                if move.firable(marking):
+                    afters.setdefault(self.timed_by(move), {})[marking ^ move.flips] = None
+            known = self._hidden_in[marking] = [(changed, tuple(those)) for changed, those in afters.items()]
+        return known
 
-    def timed_by(self, move: Move) -> list[int]:
+    def timed_by(self, move: Move) -> tuple[int, ...]:
         """The indexes in `timed` of the places that a move changes."""
         if (changed := self._timed_by.get(move.flips)) is None:
-            changed = self._timed_by[move.flips] = [i for i, bit in enumerate(self.timed) if move.flips & bit]
+            changed = tuple(i for i, bit in enumerate(self.timed) if move.flips & bit)
+            self._timed_by[move.flips] = changed
         return changed
 
     def _by_others(self, laws: Laws, station: str) -> Iterator[Move]:
