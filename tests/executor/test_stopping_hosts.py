@@ -9,6 +9,7 @@ from typing import Any
 from unittest.mock import patch
 
 import pytest
+from support.examples import some
 from support.hosts import Cell, ended_within
 
 from firable.executor.cell.virtual_time import run_in_virtual_time
@@ -127,12 +128,13 @@ async def tried(folder: Path, victim: tuple[str, ...], how: str, order: tuple[tu
     assert cell.replayed().firings > stood + 15
 
 
+@pytest.mark.seeds
 @pytest.mark.parametrize("how", ["frozen", "killed"])
 @pytest.mark.parametrize("victim", FOUR, ids=lambda machines: machines[0])
 def test_hosts_stopped_in_any_order_end_in_time_while_one_is_gone_and_lose_nothing(
     victim: tuple[str, ...], how: str, tmp_path: Path
 ) -> None:
-    for i, order in enumerate(permutations(FOUR)):
+    for i, order in some(enumerate(permutations(FOUR)), 2):
         folder = tmp_path / str(i)
         folder.mkdir()
         run_in_virtual_time(tried(folder, victim, how, order, i))
