@@ -9,6 +9,7 @@ A solver says the same of the same text, so it is asked once in a process: most 
 Whoever runs the tests in the background has Ctrl-C ignored, and so would all processes that the tests start.
 
 Ten thousand collected tests live to the end. The garbage collector is told so, or it looks at them all again and again.
+It looks less often than Python has it do, because most tests build what they need and drop it, with few cycles.
 """
 
 import gc
@@ -46,6 +47,7 @@ def asked_once() -> Iterator[None]:
 def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
+    gc.set_threshold(20_000, 20, 50)
 
 
 def pytest_report_header() -> list[str]:
