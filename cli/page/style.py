@@ -79,7 +79,7 @@ border-bottom:1px solid var(--line)}
 .verdict .what{overflow-wrap:anywhere}
 .verdict .code{color:var(--soft)}
 .hint{color:var(--soft);border-left:3px solid var(--line);padding-left:.7rem}
-.outcome{font-weight:600;border-left:3px solid var(--bad);padding-left:.7rem;margin:.9rem 0}
+.outcome{font-weight:600;border-left:3px solid var(--bad);padding-left:.7rem;margin:.9rem 0;overflow-wrap:anywhere}
 .counter{padding:.9rem 0 1.2rem;border-bottom:1px solid var(--line);scroll-margin-top:0}
 .counter:last-child{border-bottom:0}
 .counter h3{margin:0 0 .2rem;overflow-wrap:anywhere}
