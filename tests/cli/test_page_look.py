@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser
@@ -11,8 +10,31 @@ from support.browser import browser, needs_browser, page_at
 
 from firable.cli.main import main
 
-CELLS = {"one_robot": (), "two_cells": ("--faults", "--wrong")}
-"""The cells, and what is asked of the protocol of each: of the wide one for every section, of the other for none."""
+CELLS = {"one_robot": (), "two_cells": (), "long_names": ("--faults", "--wrong")}
+"""The cells, and what is asked of the protocol of each: for every section, of one with long names and few markings."""
+LONG_NAMES = """\
+firable: 1
+cell: long-names
+controllers:
+  coordinator_of_the_line:
+    coordinator: true
+  coordinator_of_the_cell:
+    under: coordinator_of_the_line
+  robot_of_the_cell:
+    under: coordinator_of_the_cell
+    start: [holding_a_workpiece]
+    places: {holding_a_workpiece: {}, empty_handed: {}}
+  lathe_of_the_cell:
+    under: coordinator_of_the_cell
+    start: [empty_and_open]
+    places: {empty_and_open: {}, full_and_closed: {}}
+transitions:
+  hand_over_to_the_lathe:
+    from: [robot_of_the_cell.holding_a_workpiece, lathe_of_the_cell.empty_and_open]
+    to: [robot_of_the_cell.empty_handed, lathe_of_the_cell.full_and_closed]
+  fetch_the_next_workpiece: {from: robot_of_the_cell.empty_handed, to: robot_of_the_cell.holding_a_workpiece}
+  take_out_of_the_lathe: {from: lathe_of_the_cell.full_and_closed, to: lathe_of_the_cell.empty_and_open}
+"""
 WINDOW = "[document.documentElement.scrollWidth, document.documentElement.clientWidth]"
 CUT_OFF = """() => [...document.querySelectorAll('nav a')].map(link => link.getBoundingClientRect())
     .filter(box => box.left < 0 || box.right > innerWidth).length"""
@@ -27,11 +49,13 @@ def chromium() -> Iterator[Browser]:
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """The page of each cell."""
-    found = {}
+    found, folder = {}, tmp_path_factory.mktemp("look")
+    (folder / "long_names.firable.yaml").write_text(LONG_NAMES, "utf-8")
     for name, asked in CELLS.items():
-        page = tmp_path_factory.mktemp("look") / f"{name}.html"
-        assert main(["prove", f"catalogue:{name}", *asked, "--report", str(page)]) == 0
-        found[name] = Path(page).as_uri()
+        net = str(folder / "long_names.firable.yaml") if name == "long_names" else f"catalogue:{name}"
+        page = folder / f"{name}.html"
+        assert main(["prove", net, *asked, "--report", str(page)]) == 0
+        found[name] = page.as_uri()
     return found
 
 
