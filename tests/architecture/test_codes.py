@@ -32,7 +32,10 @@ def strings(tree: ast.AST) -> Iterator[str]:
 
 
 def codes_in(file: Path) -> set[str]:
-    return {code for text in strings(ast.parse(file.read_text("utf-8"))) for code in CODE.findall(text)}
+    source = file.read_text("utf-8")
+    if not CODE.search(source):
+        return set()
+    return {code for text in strings(ast.parse(source)) for code in CODE.findall(text)}
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +56,8 @@ def test_a_code_that_the_product_cannot_meet_is_reported_by_the_carrier(code: st
 
 def test_no_diagnostic_is_without_a_hint() -> None:
     for file in (file for room in ROOMS for file in (ROOT / room).rglob("*.py")):
-        for call in ast.walk(ast.parse(file.read_text("utf-8"))):
+        source = file.read_text("utf-8")
+        for call in ast.walk(ast.parse(source)) if "Diagnostic" in source else ():
             if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "Diagnostic":
                 hints = [*call.args[2:3], *(one.value for one in call.keywords if one.arg == "hint")]
                 assert [ast.unparse(hint) for hint in hints] not in ([], ["''"]), f"{file}:{call.lineno}"
