@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import cached_property
+from math import inf
 from typing import Any, Generic, Protocol, TypeVar
 
 from firable.analysis.deadline import Deadline
@@ -107,8 +108,8 @@ class StateSpace(Protocol[S]):
         """The same space, for questions that end with another deadline."""
         ...
 
-    def turn(self, share: float, /) -> AbstractContextManager[None]:
-        """Let what is asked meanwhile take at most this part of the time that is left."""
+    def turn(self, share: float, most_seconds: float = inf, /) -> AbstractContextManager[None]:
+        """Let what is asked meanwhile take at most this part of the time that is left, and so many seconds."""
         ...
 
     def require_complete(self) -> None:
@@ -219,7 +220,7 @@ class StateSpace(Protocol[S]):
 class Derived(Generic[S]):
     """The second half of a state space, from the first."""
 
-    def turn(self: StateSpace[S], _: float, /) -> AbstractContextManager[None]:
+    def turn(self: StateSpace[S], _: float, __: float = inf, /) -> AbstractContextManager[None]:
         """No limit: to pass over markings that are held one by one is short beside finding them."""
         return nullcontext()
 

@@ -20,6 +20,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import inf
 from typing import Any
 
 from firable.analysis import _engine
@@ -55,6 +56,7 @@ class SymbolicSpace(Derived[MarkingSet]):
     n_markings: int
     deadline: Deadline = NEVER
     counted: dict[str, int] = field(default_factory=dict, compare=False, repr=False)
+    _turns: list[Deadline] = field(default_factory=list, init=False, compare=False, repr=False)
     discipline: Discipline = Discipline.INTERLEAVING
     method: str = METHOD
     complete: bool = True
@@ -66,15 +68,17 @@ class SymbolicSpace(Derived[MarkingSet]):
         return replace(self, deadline=deadline)
 
     @contextmanager
-    def turn(self, share: float, /) -> Iterator[None]:
+    def turn(self, share: float, most_seconds: float = inf, /) -> Iterator[None]:
         """Let what is asked meanwhile take at most this part of the time left: one fixpoint may take all of it."""
-        left = self.deadline.left_seconds
-        if left is not None:
-            self.engine.limit(**engine_limits(self.deadline.within(left * share)))
+        outer = self._turns[-1] if self._turns else self.deadline
+        left = outer.left_seconds
+        self._turns.append(outer.within(most_seconds if left is None else min(most_seconds, left * share)))
+        self.engine.limit(**engine_limits(self._turns[-1]))
         try:
             yield
         finally:
-            self.engine.limit(**engine_limits(self.deadline))
+            self._turns.pop()
+            self.engine.limit(**engine_limits(outer))
 
     def require_complete(self) -> None:
         """It always is: an incomplete search makes no space."""

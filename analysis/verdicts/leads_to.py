@@ -46,8 +46,8 @@ from firable.semantics.trace import Discipline
 
 Matrix = npt.NDArray[np.bool_]
 """One Boolean for each component and transition."""
-GOING_ON_SHARE = 0.25
-"""The part of the time left that sets may take to go on with a run, which decides nothing any more."""
+GOING_ON_SHARE, GOING_ON_SECONDS = 0.25, 10.0
+"""The part of the time left, and the time, that sets may take to go on with a run: it decides nothing any more."""
 
 
 def leads_to(space: StateSpace[Any], of: Property) -> Answer:
@@ -72,7 +72,7 @@ def _by_sets(space: StateSpace[S], of: Property) -> Answer:
     if witness is None:
         return yes()
     try:
-        with space.turn(GOING_ON_SHARE):
+        with space.turn(GOING_ON_SHARE, GOING_ON_SECONDS):
             whole = unanswered(space, without, around, of.fairness, witness)
     except BudgetExceeded:
         whole = None

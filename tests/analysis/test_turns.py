@@ -10,6 +10,7 @@ from typing import Any, cast
 
 import pytest
 
+from firable.analysis._engine import BudgetExceeded
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.question import Answer, Question, unknown
 from firable.analysis.report import _in_turn
@@ -79,3 +80,15 @@ def test_a_turn_on_a_diagram_ends_with_its_part_of_the_time_and_leaves_the_rest(
     with pytest.raises(ZeroDivisionError), space.turn(0.25):
         raise ZeroDivisionError
     assert limits == [pytest.approx(900, abs=30), pytest.approx(3600, abs=30)]
+    limits.clear()
+    with space.turn(0.5), space.turn(0.5), space.turn(0.5, 10.0):
+        pass
+    assert limits == [pytest.approx(of, abs=30) for of in (1800, 900, 10, 900, 1800, 3600)]
+
+
+def test_a_turn_on_a_diagram_ends_in_time_where_nothing_else_does() -> None:
+    space = explore_symbolically(family_net("philosophers-100"))
+    with pytest.raises(BudgetExceeded), space.turn(1.0, 0.0):
+        space.backward(space.deadlocks)
+    with space.turn(0.25):
+        assert space.backward(space.deadlocks) == space.reach
