@@ -9,14 +9,15 @@ from support.examples import examples
 from support.naive_space import NaiveSpace
 from support.ring_nets import ring_nets
 
+from firable.analysis.evidence.certificate import FiringSequence
+from firable.analysis.evidence.checking.checker import check_evidence
+from firable.analysis.evidence.checking.obligation import Evidence
+from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.analysis.spaces.reachability import explore
 from firable.analysis.verdicts.properties import decide_property
 from firable.nets.formula import parse_formula
 from firable.nets.net import Fairness, Net, Property, PropertyKind
 from firable.nets.verdict import Status
-from firable.semantics.algebra import BOOL
-from firable.semantics.formulas import evaluate
-from firable.semantics.player import holds_in
 from firable.semantics.trace import Discipline
 
 TEXTS = ("a", "b", "not a", "a and not b", "a or b", "deadlock", "firable(t0)", "not firable(t1)", "true")
@@ -37,6 +38,6 @@ def test_sets_decide_response_as_components_do(
     assert by_sets.status is by_components.status
     if by_sets.status is Status.VIOLATED:
         assert by_sets.witness is not None
-        marking = net.marking(by_sets.witness.marking)
-        assert evaluate(BOOL, net, p, holds_in(marking))
-        assert not evaluate(BOOL, net, q, holds_in(marking))
+        run = FiringSequence(by_sets.witness.firings, by_sets.witness.cycle)
+        claim = Claim(ClaimKind.NOT_LEADS_TO, p, q, fairness)
+        assert check_evidence(Evidence(net, discipline, claim, run)).shown
