@@ -69,7 +69,7 @@ lint-format: $(MADE)/develop
 	$(BIN)/ruff format --check .
 
 lint-types: $(MADE)/develop
-	failed=0; $(BIN)/mypy || failed=1; $(BIN)/mypy tests $(wildcard benchmarks/*.py) || failed=1; exit $$failed
+	$(BIN)/mypy src/firable tests $(wildcard benchmarks/*.py)
 
 lint-rust: lint-rust-format lint-clippy
 

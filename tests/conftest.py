@@ -20,11 +20,9 @@ from functools import lru_cache
 
 import pytest
 from hypothesis import settings
-from support.examples import FACTOR, FIRST_SEED
+from support.examples import FACTOR, FIRST_SEED, IN_CAMPAIGN, IS_REPEATED, examples
 
-IN_CAMPAIGN = FACTOR > 1
-
-settings.register_profile("firable", deadline=None, derandomize=bool(os.environ.get("CI")) and not IN_CAMPAIGN)
+settings.register_profile("firable", examples(100), derandomize=IS_REPEATED)
 settings.load_profile("firable")
 os.environ["FIRABLE_CACHE"] = ""
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

@@ -79,14 +79,17 @@ def test_printing_outside_the_command_line_stops_the_gate(output: str, room: str
     assert (f"{room}/planted_printing_{room}.py:3:1" in output) == (room not in {"cli", "benchmarks"})
 
 
+CRATE = ROOT / "analysis" / "engine"
+PYTHON = '#[cfg(feature = "extension-module")]\nmod python;\n'
+"""How the crate has what only Python sees."""
+
+
 def planted_crate(folder: Path, text: str) -> Path:
-    crate = ROOT / "analysis" / "engine"
-    folder.mkdir(parents=True, exist_ok=True)
-    shutil.copytree(crate / "src", folder / "src", dirs_exist_ok=True)
+    """A crate with the settings of ours, and nothing in it but this."""
+    (folder / "src").mkdir(parents=True, exist_ok=True)
     for name in ("Cargo.toml", "Cargo.lock", "rustfmt.toml"):
-        shutil.copy2(crate / name, folder / name)
-    with (folder / "src" / "lib.rs").open("a", encoding="utf-8") as stream:
-        stream.write(text)
+        shutil.copy2(CRATE / name, folder / name)
+    (folder / "src" / "lib.rs").write_text(f"//! Planted.\n{text}", encoding="utf-8")
     return folder
 
 
@@ -97,12 +100,14 @@ def test_a_badly_formatted_line_in_the_crate_stops_the_gate(tmp_path: Path) -> N
 
 def test_a_clippy_warning_in_the_crate_stops_the_gate_also_in_what_only_python_sees() -> None:
     # Always the same folder, inside the target folder: so the dependencies are those that the gate has built already.
-    target = ROOT / "analysis" / "engine" / "target"
-    text = "\n/// Planted.\npub fn planted(bytes: &Vec<u8>) -> bool {\n    bytes.len() == 0\n}\n"
+    target = CRATE / "target"
+    assert PYTHON in (CRATE / "src" / "lib.rs").read_text(encoding="utf-8")
+    text = f"{PYTHON}\n/// Planted.\npub fn planted(bytes: &Vec<u8>) -> bool {{\n    bytes.len() == 0\n}}\n"
     crate = planted_crate(target / "planted", text)
     inside = crate / "src" / "python" / "mod.rs"
-    planted = "\npub fn planted(flag: bool) -> bool {\n    if flag == true { false } else { true }\n}\n"
-    inside.write_text(inside.read_text(encoding="utf-8") + planted, encoding="utf-8")
+    inside.parent.mkdir(exist_ok=True)
+    planted = "//! Planted.\n\npub fn planted(flag: bool) -> bool {\n    if flag == true { false } else { true }\n}\n"
+    inside.write_text(planted, encoding="utf-8")
     output = make(ROOT, "lint-clippy", f"CRATE={crate}", CARGO_TARGET_DIR=str(target))
     assert "clippy::len-zero" in output
     assert "clippy::ptr-arg" in output
