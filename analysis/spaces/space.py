@@ -108,8 +108,11 @@ class StateSpace(Protocol[S]):
         """The same space, for questions that end with another deadline."""
         ...
 
-    def turn(self, share: float, most_seconds: float = inf, /) -> AbstractContextManager[None]:
-        """Let what is asked meanwhile take at most this part of the time that is left, and so many seconds."""
+    def turn(self, share: float, most_seconds: float = inf, /) -> AbstractContextManager[Deadline]:
+        """Let what is asked meanwhile take at most this part of the time that is left, and so many seconds.
+
+        What asks for many things, each of them short, asks the deadline of the turn itself.
+        """
         ...
 
     def require_complete(self) -> None:
@@ -220,9 +223,9 @@ class StateSpace(Protocol[S]):
 class Derived(Generic[S]):
     """The second half of a state space, from the first."""
 
-    def turn(self: StateSpace[S], _: float, __: float = inf, /) -> AbstractContextManager[None]:
+    def turn(self: StateSpace[S], _: float, __: float = inf, /) -> AbstractContextManager[Deadline]:
         """No limit: to pass over markings that are held one by one is short beside finding them."""
-        return nullcontext()
+        return nullcontext(self.deadline)
 
     def satisfying(self: StateSpace[S], formula: Formula) -> S:
         """The markings in which a state formula holds."""

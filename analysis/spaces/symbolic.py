@@ -68,14 +68,15 @@ class SymbolicSpace(Derived[MarkingSet]):
         return replace(self, deadline=deadline)
 
     @contextmanager
-    def turn(self, share: float, most_seconds: float = inf, /) -> Iterator[None]:
+    def turn(self, share: float, most_seconds: float = inf, /) -> Iterator[Deadline]:
         """Let what is asked meanwhile take at most this part of the time left: one fixpoint may take all of it."""
         outer = self._turns[-1] if self._turns else self.deadline
         left = outer.left_seconds
-        self._turns.append(outer.within(most_seconds if left is None else min(most_seconds, left * share)))
-        self.engine.limit(**engine_limits(self._turns[-1]))
+        turn = outer.within(most_seconds if left is None else min(most_seconds, left * share))
+        self._turns.append(turn)
+        self.engine.limit(**engine_limits(turn))
         try:
-            yield
+            yield turn
         finally:
             self._turns.pop()
             self.engine.limit(**engine_limits(outer))

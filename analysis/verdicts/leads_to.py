@@ -72,8 +72,8 @@ def _by_sets(space: StateSpace[S], of: Property) -> Answer:
     if witness is None:
         return yes()
     try:
-        with space.turn(GOING_ON_SHARE, GOING_ON_SECONDS):
-            whole = unanswered(space, without, around, of.fairness, witness)
+        with space.turn(GOING_ON_SHARE, GOING_ON_SECONDS) as deadline:
+            whole = unanswered(space, without, around, of.fairness, witness, deadline)
     except BudgetExceeded:
         whole = None
     if whole is None:

@@ -15,6 +15,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from firable.analysis._engine import BudgetExceeded
+from firable.analysis.deadline import Deadline
 from firable.analysis.spaces.space import S, StateSpace, Witnesses
 from firable.nets.net import Fairness, Marking
 from firable.nets.verdict import Witness
@@ -22,14 +24,17 @@ from firable.semantics.player import FiringSet, Player
 from firable.semantics.trace import Discipline
 
 
-def unanswered(space: StateSpace[S], without: S, around: S, fairness: Fairness, witness: Witness) -> Witness | None:
+def unanswered(
+    space: StateSpace[S], without: S, around: S, fairness: Fairness, witness: Witness, deadline: Deadline
+) -> Witness | None:
     """The run of a witness, gone on with to a deadlock or round a fair cycle; None where there is no way to either.
 
-    It stays in `without`, the markings without the answer, and `around` are the `fair_markings` of these.
+    It stays in `without`, the markings without the answer, and `around` are the `fair_markings` of these. Raises
+    `BudgetExceeded` where it is not there by the deadline: on a long way each step is too short to notice.
     """
     algebra = space.algebra
     stuck = algebra.conjunction([space.deadlocks, without])
-    walk = _Walk(space, space.net.marking(witness.marking))
+    walk = _Walk(space, space.net.marking(witness.marking), deadline)
     if not walk.go(algebra.disjunction([around, stuck]), without):
         return None
     *before, cycle = _rounds(walk, around, fairness) if space.contains(around, walk.at) else [[]]
@@ -43,7 +48,7 @@ def _rounds(walk: _Walk, around: Any, fairness: Fairness) -> list[list[FiringSet
     """What is fired in rounds that were given up, and in the last one, which ends where it began and is fair."""
     space, algebra, rounds = walk.space, walk.space.algebra, list[list[FiringSet]]()
     while True:
-        walk = _Walk(space, walk.at)
+        walk = _Walk(space, walk.at, walk.deadline)
         rounds.append(walk.fired)
         home = space.alone(walk.at)
         walk.fire(around)
@@ -66,8 +71,8 @@ def _rounds(walk: _Walk, around: Any, fairness: Fairness) -> list[list[FiringSet
 class _Walk:
     """A walk through the markings, with what it fired, and what might have fired in the markings it met."""
 
-    def __init__(self, space: StateSpace[Any], at: Marking) -> None:
-        self.space, self.at, self.player = space, at, Player(space.net)
+    def __init__(self, space: StateSpace[Any], at: Marking, deadline: Deadline) -> None:
+        self.space, self.at, self.deadline, self.player = space, at, deadline, Player(space.net)
         self.fired: list[FiringSet] = []
         self.enabled = [frozenset(self.player.may_fire(at))]
 
@@ -76,6 +81,7 @@ class _Walk:
         space, algebra = self.space, self.space.algebra
         nearer, size = [targets], space.count(targets)
         while not space.contains(nearer[-1], self.at):
+            self._in_time()
             ahead = algebra.conjunction([within, space.before(nearer[-1])])
             nearer.append(algebra.disjunction([nearer[-1], ahead]))
             before, size = size, space.count(nearer[-1])
@@ -87,11 +93,16 @@ class _Walk:
 
     def fire(self, into: Any, t: int | None = None) -> None:
         """Fire what leads into a set, and holds `t` if it is given; raises `StopIteration` where nothing does."""
+        self._in_time()
         successors = self.player.successors(self.at, step=self.space.discipline is Discipline.STEP)
         some = ((f, to) for f, to in successors if (t is None or t in f) and self.space.contains(into, to))
         fired, self.at = next(some)
         self.fired.append(fired)
         self.enabled.append(frozenset(self.player.may_fire(self.at)))
+
+    def _in_time(self) -> None:
+        if self.deadline.over:
+            raise BudgetExceeded("the time is over in which a run is gone on with")
 
     def owed(self, fairness: Fairness) -> int | None:
         """A transition that fairness demands of a cycle through these markings, and that has not fired."""

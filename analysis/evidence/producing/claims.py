@@ -157,7 +157,7 @@ class Certifier:
             raise LackingError("there are too many markings to find the run that goes on without an answer")
         without = space.algebra.negation(space.satisfying(claim.then))
         around = fair_markings(space, without, claim.fairness)
-        whole = unanswered(space, without, around, claim.fairness, witness)
+        whole = unanswered(space, without, around, claim.fairness, witness, space.deadline)
         return None if whole is None else FiringSequence(whole.firings, whole.cycle)
 
     def _unordered(self, witness: Witness) -> FiringSequence | None:
