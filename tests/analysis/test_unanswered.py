@@ -13,7 +13,9 @@ from support.naive_space import NaiveSpace
 from support.ring_nets import ring_nets
 from support.whole_nets import formulas
 
+from firable.analysis._engine import BudgetExceeded
 from firable.analysis.check import check
+from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.certificate import Certificate, FiringSequence
 from firable.analysis.evidence.checking.checker import check_document, check_evidence
 from firable.analysis.evidence.checking.obligation import Evidence
@@ -24,9 +26,10 @@ from firable.analysis.goal import Limits
 from firable.analysis.spaces.space import StateSpace
 from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.analysis.verdicts.leads_to import leads_to
+from firable.analysis.verdicts.unanswered import unanswered
 from firable.nets.formula import Formula, Holds, Start
 from firable.nets.net import Fairness, Net, Place, Property, PropertyKind, Transition
-from firable.nets.verdict import Status
+from firable.nets.verdict import Status, Witness
 from firable.semantics.trace import Discipline
 
 
@@ -121,3 +124,17 @@ def test_where_there_was_no_time_to_go_on_the_evidence_does(net: Net, monkeypatc
     claim = Claim(ClaimKind.NOT_LEADS_TO, of.formula, of.then, of.fairness)
     run = Certifier(net, Discipline.INTERLEAVING, Limits()).certify(claim, begun)
     assert run == FiringSequence(whole.firings, whole.cycle)
+
+
+def test_no_layer_is_looked_for_when_the_time_is_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    chain = tuple(Transition(f"t{i}", (f"p{i}",), (f"p{i + 1}",)) for i in range(9))
+    net = Net("chain", tuple(Place(f"p{i}", marked=i == 0) for i in range(10)), chain)
+    space = NaiveSpace(net, Discipline.INTERLEAVING)
+    begun = Witness(marking=("p0",))
+    everywhere, nowhere = space.algebra.conjunction([]), space.algebra.disjunction([])
+    whole = unanswered(space, everywhere, nowhere, Fairness.NONE, begun, NEVER)
+    assert whole is not None
+    assert (len(whole.firings), whole.cycle) == (9, ())
+    monkeypatch.setattr(NaiveSpace, "before", lambda *_: pytest.fail("no time is left for it"))
+    with pytest.raises(BudgetExceeded):
+        unanswered(space, everywhere, nowhere, Fairness.NONE, begun, Deadline.after(0))
