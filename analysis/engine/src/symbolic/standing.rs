@@ -5,7 +5,8 @@
 //! whatever the number of markings that come back.
 //!
 //! An order that was found for the net itself is the better one for what is asked later, where fixed points go on round
-//! by round. So the search begins on the net itself, and goes on with the smaller one where it is not over soon.
+//! by round. So the search begins on the net itself, and goes on with the smaller one where it is not over soon, and that
+//! one is so much smaller that to begin anew is worth it.
 //!
 //! What stands in what is as deep as there were rounds of merging, so the recursion over that is bounded.
 
@@ -18,6 +19,9 @@ use super::trial::meets_contact;
 use super::zdd::{EMPTY, Node, Store, UNIT};
 use crate::budget::{Stop, Watch};
 use crate::net::Transition;
+
+/// How many of four places are left at most, where the search begins anew.
+const LEFT_OF_FOUR: usize = 3;
 
 /// No node yet.
 const NONE: Node = Node::MAX;
@@ -67,6 +71,7 @@ impl Symbolic {
         watch: &mut Watch<'_>,
     ) -> Result<Self, Stop> {
         let smaller = if orders.is_none() { merged(places, &transitions, &initial, watch)? } else { None };
+        let smaller = smaller.filter(|small| 4 * small.stands.len() <= LEFT_OF_FOUR * places);
         let net = (transitions.clone(), initial.clone());
         let mut race = Race::new(places, net, orders, watch)?;
         let Some(smaller) = smaller else { return race.run(bytes, watch) };

@@ -26,8 +26,12 @@ const FREE: u32 = u32::MAX;
 /// No node: a terminal is in no chain.
 const NIL: u32 = 0;
 const NODES_MAX: usize = (1 << 31) - 1;
-/// Below this number of nodes nothing is collected.
+/// Below this number of nodes nothing is collected; below the second one neither, where there is memory for many times as
+/// many. What no root leads to is not yet useless: a search meets it again, and with it goes what was remembered of it.
 const COLLECT_FROM: usize = 1 << 20;
+const COLLECT_FROM_MOST: usize = 1 << 22;
+/// How many bytes there are for each of these.
+const BYTES_PER_NODE: usize = 1 << 10;
 /// How many chains there are for each node that is remembered as the last of its hash.
 const PER_LAST: usize = 2;
 /// How many chains there are at least for each node: to look into one that does not hold what is wanted costs a miss of
@@ -85,6 +89,11 @@ fn hash(level: u32, lo: Node, hi: Node) -> u64 {
     (mixed ^ mixed >> 32) << 4 | u64::from((lo ^ hi) & 15)
 }
 
+/// The number of nodes below which nothing is collected.
+fn collect_from(memory: &Memory) -> usize {
+    (memory.limit() / BYTES_PER_NODE).clamp(COLLECT_FROM, COLLECT_FROM_MOST)
+}
+
 /// Empty chains, claimed.
 fn buckets(memory: &Memory, size: usize) -> Result<Region<u32>, Stop> {
     let bytes = size * size_of::<u32>();
@@ -101,7 +110,7 @@ impl Store {
             last: buckets(&memory, (1 << 10) / PER_LAST)?,
             free: NIL,
             used: 2,
-            collect_at: COLLECT_FROM,
+            collect_at: collect_from(&memory),
             memory,
         };
         for _ in 0..2 {
@@ -272,12 +281,32 @@ impl Store {
             }
         }
         self.chain();
-        self.collect_at = COLLECT_FROM.max(2 * self.used);
+        self.collect_at = collect_from(&self.memory).max(2 * self.used);
         Ok(marks)
     }
 
     /// Gives the marks of a collection back.
     pub fn done(&self, marks: Marks) {
         self.memory.release(marks.0.len() * size_of::<u64>());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn where_memory_is_ample_more_nodes_are_made_before_the_next_collection() {
+        let ample = 2 * COLLECT_FROM * BYTES_PER_NODE;
+        for (limit, from) in [(ample / 4, COLLECT_FROM), (ample, 2 * COLLECT_FROM), (4 * ample, COLLECT_FROM_MOST)] {
+            let mut store = Store::new(Memory::new(limit)).expect("enough room");
+            assert_eq!(store.collect_at, from);
+            // What may be held is said anew now and then.
+            store.memory.allow(ample / 2);
+            store.node(1, EMPTY, UNIT).expect("enough room");
+            let marks = store.collect([].into_iter()).expect("enough room");
+            store.done(marks);
+            assert_eq!((store.used(), store.collect_at), (2, COLLECT_FROM));
+        }
     }
 }
