@@ -14,6 +14,7 @@ docs/queries.md says what each means. The other form of the file is the property
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -79,7 +80,7 @@ def parse_query(text: str, name: str = "query") -> Query:
     >>> parse_query("ltl G (p -> F q)") == parse_query("G (p -> F q)")
     True
     """
-    word, _, rest = text.partition(" ")
+    word, rest = (*re.split(r"\s", text, maxsplit=1), "")[:2]
     offset = len(text) - len(rest)
     match word:
         case QueryKind.LIVE | QueryKind.QUASI_LIVE | QueryKind.STABLE_MARKING | QueryKind.ONE_SAFE:
@@ -187,7 +188,8 @@ class _Lines:
                 self.refuse("F1012", f"not a query: {error.message}", hint, number, column + error.column)
                 continue
             for problem in known.problems(query):
-                self.report(_in_query(problem, self.source, text.strip(), number, column))
+                at, length = _named(problem, text.strip())
+                self.report(replace(problem, span=self.source.span(number, column + at, length)))
             yield query
 
 
@@ -224,7 +226,7 @@ class KnownNames:
 
 
 def query_named(text: str, net: Net, name: str = "query") -> Query:
-    """Read one query that stands alone, such as an argument of a command.
+    """Read one query that stands alone, such as an argument of a command; it may have several lines.
 
     Raises `InputError`: F1012 where it is none, F2002 and F2004 for unknown names.
     """
@@ -233,15 +235,14 @@ def query_named(text: str, net: Net, name: str = "query") -> Query:
         query = parse_query(text.strip(), name)
     except FormulaError as error:
         hint = "docs/queries.md has the grammar"
-        column = len(text) - len(text.lstrip()) + error.column + 1
-        raise source.refuse("F1012", f"not a query: {error.message}", hint, 1, column) from None
+        span = source.span_at(len(text) - len(text.lstrip()) + error.column)
+        raise InputError([Diagnostic("F1012", f"not a query: {error.message}", hint, span=span)]) from None
     if problems := list(KnownNames(net).problems(query)):
-        raise InputError(_in_query(problem, source, text, 1, 1) for problem in problems)
+        raise InputError(replace(problem, span=source.span_at(*_named(problem, text))) for problem in problems)
     return query
 
 
-def _in_query(problem: Diagnostic, source: Source, text: str, line: int, column: int) -> Diagnostic:
-    """A problem with a name, where that stands in the text of a query, which begins at a line and column."""
+def _named(problem: Diagnostic, text: str) -> tuple[int, int]:
+    """Where (from 0) the name that a problem is about stands in the text of a query, and its length."""
     (name,) = problem.subject
-    at = next((token.column for token in tokens_of(text) if token.text == name), 0)
-    return replace(problem, span=source.span(line, column + at, len(name)))
+    return next((token.column for token in tokens_of(text) if token.text == name), 0), len(name)

@@ -49,6 +49,11 @@ class Source:
             text = window
         return Span(self.file, line, column, printable(text), max(1, length), start)
 
+    def span_at(self, offset: int, length: int = 1) -> Span:
+        """The span at a character (from 0) of the whole text."""
+        before = Source(self.file, self.text[:offset]).lines
+        return self.span(len(before), len(before[-1]) + 1, length)
+
     def with_parts(self, parts: Iterable[tuple[int, int, int, str]]) -> str:
         """The text with parts of lines replaced, each by line, column (from 1), length and the new text."""
         lines = re.split(r"(\r\n|\r|\n)", self.text)  # lines at even indexes, their ends between them

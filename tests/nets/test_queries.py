@@ -13,6 +13,7 @@ from firable.nets.net import Net, Place, Transition
 from firable.nets.pnml import parse_pnml
 from firable.nets.property_xml import parse_property_xml
 from firable.nets.queries import Query, QueryKind, format_query, parse_queries, parse_query, query_named, read_queries
+from firable.nets.source import Source
 
 NET = Net("n", (Place("p", marked=True), Place("q")), (Transition("t", ("p",), ("q",)), Transition("u")))
 
@@ -101,6 +102,30 @@ def test_a_single_query_is_checked_like_a_file() -> None:
         span = caught.value.diagnostics[0].span
         assert span is not None
         assert (span.line, span.column) == (1, column)
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "line", "column"),
+    [
+        ("AG (p\n  and q\n  or)", "F1012", 3, 5),
+        ("\n\n AG EF", "F1012", 3, 7),
+        ("AG (p\r\n  and r)", "F2002", 2, 7),
+        ("bound\n  tokens(p,\n  r)", "F2002", 3, 3),
+        ("ctl\tAG (p\nand firable(r))", "F2004", 2, 13),
+    ],
+)
+def test_a_query_of_several_lines_is_refused_at_its_line_and_column(
+    text: str, code: str, line: int, column: int
+) -> None:
+    with pytest.raises(InputError, match=code) as caught:
+        query_named(text, NET)
+    span = caught.value.diagnostics[0].span
+    assert span is not None
+    assert (span.line, span.column, span.excerpt) == (line, column, Source("", text).span(line, 1).excerpt)
+
+
+def test_the_word_before_a_query_ends_at_any_blank() -> None:
+    assert parse_query("bound\ntokens(p)") == parse_query("bound\ttokens(p)") == parse_query("bound tokens(p)")
 
 
 @pytest.mark.parametrize(
