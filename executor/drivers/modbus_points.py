@@ -1,12 +1,15 @@
 """Points of Modbus devices: what an address means, and which of them one request reads or writes.
 
 Points are `coil N`, `discrete N`, `input N` and `holding N`, with addresses from 0 as they stand on the wire, and
-`holding N.B` or `input N.B` for a bit of a register, from 0. Those next to each other go into one request, never with a
-gap, because a device may refuse what is not there.
+`holding N.B` or `input N.B` for a bit of a register, from 0. A number has one spelling, so that points can be compared
+as they are written: `holding 010` would be the register of `holding 10`, and look like another.
+
+Those next to each other go into one request, never with a gap, because a device may refuse what is not there.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -19,6 +22,7 @@ TABLES: Final = ("coil", "discrete", "input", "holding")
 BITS: Final = ("coil", "discrete")
 WRITTEN: Final = ("coil", "holding")
 ADDRESS_MAX: Final = 65_535
+BIT_MAX: Final = 15
 REGISTER_MIN: Final = -(1 << 15)
 REGISTER_MAX: Final = (1 << 16) - 1
 AT_ONCE_MAX: Final = {"coil": 1968, "discrete": 2000, "input": 125, "holding": 123}
@@ -43,13 +47,22 @@ def address(point: Point) -> Address:
     """
     table, _, rest = point.partition(" ")
     number, dot, bit = rest.partition(".")
-    if table not in TABLES or not number.isdecimal() or int(number) > ADDRESS_MAX:
-        raise ValueError("it is not `coil N`, `discrete N`, `input N` or `holding N`, with N from 0 to 65535")
+    if table not in TABLES or (at := _number(number, ADDRESS_MAX)) is None:
+        raise ValueError(
+            "it is not `coil N`, `discrete N`, `input N` or `holding N`, with N from 0 to 65535, without a 0 before it"
+        )
     if not dot:
-        return Address(table, int(number))
-    if table in BITS or not bit.isdecimal() or int(bit) > 15:
-        raise ValueError("only a register has bits, `holding N.B` or `input N.B`, with B from 0 to 15")
-    return Address(table, int(number), int(bit))
+        return Address(table, at)
+    if table in BITS or (bit_at := _number(bit, BIT_MAX)) is None:
+        raise ValueError(
+            "only a register has bits, `holding N.B` or `input N.B`, with B from 0 to 15, without a 0 before it"
+        )
+    return Address(table, at, bit_at)
+
+
+def _number(text: str, most: int) -> int | None:
+    """The number that a text is the one spelling of, up to the greatest there is."""
+    return int(text) if re.fullmatch(r"0|[1-9][0-9]{0,4}", text) and int(text) <= most else None
 
 
 @dataclass(frozen=True, slots=True)

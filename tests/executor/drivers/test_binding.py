@@ -195,6 +195,9 @@ def test_an_unknown_driver_is_refused(old: str, new: str, place: str) -> None:
         ("read: discrete 0", "read: discrete 70000", "14: read"),
         ("read: discrete 0", "read: discrete 0.1", "14: read"),
         ("read: discrete 0", "read: input 0.16", "14: read"),
+        ("read: discrete 0", "read: input 0.01", "14: read"),
+        ("write: {holding 2: 7}", "write: {holding 02: 7}", "17: holding 02"),
+        ("write: {holding 2: 7}", "write: {holding \u0662: 7}", "17: holding \u0662"),
         ("write: {holding 2: 7}", "write: {input 2: 7}", "17: input 2"),
         ("safe: {coil 1: false}", "safe: {discrete 1: false}", "9: discrete 1"),
         ("number: holding 5", "number: register 5", "12: number"),
@@ -284,6 +287,8 @@ def test_commands_of_different_words_that_a_machine_cannot_tell_apart_are_refuse
     bound_driver(parse_binding(bare.replace("M: {number: holding 1", "M: {command: holding 1")), NET)
     alike = GOOD.replace("{holding 2: 7}", "{coil 2: true}").replace("{holding 2: 8}", "{coil 2: 1}")
     assert refusal(alike, fit=True) == [("F5102", "18: write")]
+    spelled = GOOD.replace("{holding 2: 8}", "{holding 02: 7}")  # the same register, which must not look like another
+    assert refusal(spelled) == [("F5102", "18: holding 02")]
 
 
 def test_commands_of_different_machines_that_are_written_alike_are_refused_and_one_at_two_places_is_not() -> None:
