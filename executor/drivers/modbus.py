@@ -5,8 +5,9 @@ What is asked of one that is reached, and what is made of its answers, is in `mo
 
 from __future__ import annotations
 
+import asyncio
 from importlib import import_module
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, cast
 
 from pydantic import Field
 
@@ -28,6 +29,10 @@ from firable.executor.drivers.modbus_points import BITS, REGISTER_MAX, REGISTER_
 from firable.executor.reasons import port_reason
 
 if TYPE_CHECKING:
+    from functools import partial
+
+    from pymodbus.client import AsyncModbusSerialClient
+
     from firable.executor.drivers.modbus_connection import Client
 
 
@@ -120,10 +125,38 @@ class ModbusRtu(_Modbus):
             retries=0,
             reconnect_delay=0,
         )
+        _close_where_refused(client)
         try:
             return await _opened(client, options.port, options, wanted, is_line=True)
         except (ValueError, termios.error) as error:
             raise LinkError(f"{options.port} cannot be set to these options: {error}") from None
+
+
+def _close_where_refused(client: AsyncModbusSerialClient) -> None:
+    """Have a client close a port whose settings are refused once it is open.
+
+    pymodbus sets an open port once more, and where that fails keeps it: nobody could open it again.
+    """
+    from pymodbus.transport.serialtransport import SerialTransport
+
+    class Transport(SerialTransport):
+        def __init__(self, *port: Any, **settings: Any) -> None:
+            try:
+                super().__init__(*port, **settings)
+            except BaseException:
+                if opened := getattr(self, "sync_serial", None):
+                    opened.close()
+                raise
+
+    async def create() -> tuple[asyncio.Transport, asyncio.BaseProtocol]:
+        loop, protocol_of, port = wanted.args
+        protocol = protocol_of()
+        transport = Transport(loop, protocol, port, **wanted.keywords)
+        loop.call_soon(transport.setup)
+        return transport, protocol
+
+    wanted = cast("partial[Any]", client.ctx.call_create)
+    client.ctx.call_create = create
 
 
 def _port_refused(port: str) -> str:

@@ -107,6 +107,26 @@ def test_a_connection_that_leads_to_itself_is_none(monkeypatch: pytest.MonkeyPat
     asyncio.run(main())
 
 
+def test_a_serial_port_whose_settings_are_refused_is_closed_and_can_be_opened_again() -> None:
+    """A pseudo-terminal has no parity, and says so when it is set a second time, open already."""
+
+    async def main() -> None:
+        far, near = pty.openpty()
+        tty.setraw(near)
+        options = modbus.RtuOptions(port=os.ttyname(near), parity="E", every_s=0)
+        refused = []  # as who tells of them keeps them: what they hold on to is not collected
+        for _ in range(2):
+            with pytest.raises(LinkError, match="cannot be set to these options") as caught:
+                await modbus.RTU.connect(options, WANTED)
+            refused.append(caught.value)
+        connection = await modbus.RTU.connect(options.model_copy(update={"parity": "N"}), WANTED)
+        await connection.close()
+        os.close(near)
+        os.close(far)
+
+    asyncio.run(main())
+
+
 @pytest.mark.parametrize(
     "connected",
     [
