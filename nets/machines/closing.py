@@ -29,7 +29,7 @@ begun.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import chain
 from types import MappingProxyType
@@ -41,6 +41,7 @@ from firable.nets.machines.loop import ClosedLoop, Faults, Sending
 from firable.nets.machines.moment import NOTHING, Case, Literal, Moment, each
 from firable.nets.machines.plant_file import Failure, PlantModel, Stop, misfits
 from firable.nets.net import Controller, Net, Place, SignalKind, Transition
+from firable.nets.yaml_tree import Path
 
 VARIANTS_MAX: Final = 4096
 """How many variants one transition may have; it doubles with each completion that it clears."""
@@ -50,7 +51,7 @@ def close(net: Net, model: PlantModel, faults: Faults = Faults.NONE, sending: Se
     """The loop of a net with the machines of a plant.
 
     Raises `InputError`: F5003 where the plant does not fit the net, F3007 where one firing sends more than the loop can
-    tell apart, F2001 where a name of the net is taken by the plant.
+    tell apart, F2001 where a name would be that of two things.
 
     >>> from firable.nets.catalogue import catalogue_net, catalogue_plant
     >>> loop = close(catalogue_net("one_robot"), catalogue_plant("one_robot"))
@@ -85,6 +86,39 @@ class _Closing:
         self.repaired = faults is Faults.REPAIRED
         self.failed = {name: f"{PLANT}.{name}.failed" for name in model.machines if name in self.failing.values()}
 
+    def alike(
+        self, places: Iterable[Place], variants: Mapping[str, Iterable[Transition]], moves: Iterable[Transition]
+    ) -> Iterator[Diagnostic]:
+        """Names that two things of the loop would have, each where a part of it stands that somebody wrote.
+
+        They are put together of names by dots, hyphens and slashes, which may stand in each of these: so the longest
+        one that somebody wrote is what reaches over a joint.
+        """
+        made = (
+            *((place.name, "this place of the net") for place in self.net.places),
+            *((place.name, place.description) for place in places),
+            *((one.name, f"a firing of '{name}'") for name, some in variants.items() for one in some),
+            *((move.name, move.description) for move in moves),
+        )
+        written: dict[str, Path] = {
+            **{name: ("places", name) for name in self.net.place_index},
+            **{name: ("transitions", name) for name in self.net.transition_index},
+            **{name: ("sensors", name) for name in self.model.sensors},
+            **{name: ("stations", i) for i, name in enumerate(self.model.stations)},
+            **{name: ("machines", name) for name in self.model.machines},
+        }
+        first: dict[str, str] = {}
+        for name, told in made:
+            if name not in first:
+                first[name] = told
+                continue
+            cause = max((one for one in written if one in name), key=len, default="")
+            path = written.get(cause, ())
+            span = None if path[:1] in {("places",), ("transitions",)} else self.model.span(path)
+            message = f"'{name}' would name two things of the cell with its machines: {first[name]}; and {told}"
+            hint = f"rename '{cause}': the names there are put together of those of the net and of the plant"
+            yield Diagnostic("F2001", message, hint, tuple(map(str, path)), span)
+
     def timers_read(self) -> dict[str, Place]:
         """The timers that some other transition reads than the fault transition, with their places."""
         faults = {(p, t) for p, t in self.net.fault_transitions.items()}
@@ -114,7 +148,7 @@ class _Closing:
         for transition in self.net.transitions:
             _assert_projects(self.net, transition, variants[transition.name])
         moves, times, places = tuple(self.moves()), tuple(self.times()), tuple(self.places())
-        if taken := tuple(_taken(self.net, (*moves, *times), places)):
+        if taken := (*self.alike(places, variants, (*moves, *times)), *_taken(self.net, (*moves, *times))):
             raise InputError(taken)
         _assert_apart(self.net, moves, times)
         moves += times
@@ -407,11 +441,9 @@ def _too_many(transition: Transition) -> InputError:
     return InputError([Diagnostic("F3007", message, hint, ("transitions", transition.name, "to"))])
 
 
-def _taken(net: Net, moves: Iterable[Transition], places: Iterable[Place]) -> Iterator[Diagnostic]:
-    """The names of the net that the plant needs: what happens at a machine has its name, and words behind a slash."""
-    hint = "rename it: the places of the plant, and what happens in it, have names of that form"
-    for name in (place.name for place in places if place.name in net.place_index):
-        yield Diagnostic("F2001", f"'{name}' names one of the places, and a thing of the plant", hint, ("places", name))
+def _taken(net: Net, moves: Iterable[Transition]) -> Iterator[Diagnostic]:
+    """Transitions of the net with the name of something that happens at a machine, which words behind a slash end."""
+    hint = "rename it: what happens in the plant has names of that form"
     parts = (move.name.split("/") for move in moves)
     begun = {"/".join(some[:length]) for some in parts for length in range(1, len(some) + 1)}
     for name in (t.name for t in net.transitions if "/" in t.name and t.name in begun):

@@ -204,8 +204,11 @@ class PlantModel(_Model):
 
     def misfit(self, path: Path, subject: Subject, message: str, hint: str) -> Diagnostic:
         """What does not fit a net (F5003), at the place of the file that a path leads to, as far as it does."""
-        span = _span(*self._read, path) if self._read else None
-        return Diagnostic("F5003", message, hint, subject, span)
+        return Diagnostic("F5003", message, hint, subject, self.span(path))
+
+    def span(self, path: Path) -> Span | None:
+        """Where a path of the file ends, as far as it leads; None where the plant is of no file."""
+        return _span(*self._read, path) if self._read else None
 
 
 _COMMAND: Final = ("machines", "*", "commands", "*")

@@ -188,6 +188,41 @@ def test_a_net_with_a_name_that_the_plant_takes_is_refused() -> None:
     assert "F2001" in {problem.code for problem in refusal.value.diagnostics}
 
 
+def test_a_name_that_two_things_of_the_loop_would_have_is_told_where_its_cause_is_written() -> None:
+    net = parse_net(
+        """\
+firable: 1
+cell: x
+controllers:
+  c:
+    places: {idle: , stop: {send: {machine: R, command: STOP}, until: stopped}}
+    start: idle
+places:
+  raw: {send: {machine: R, command: MOVE, to: HERE}}
+  halt: {send: {machine: R, command: STOP}, until: halted}
+  halt/undone-raw: {send: {machine: R, command: STOP}, until: late}
+transitions:
+  t: {from: c.idle, to: c.stop}
+""",
+        "x.firable.yaml",
+    )
+    commands = "{MOVE: {does: move, takes_s: 1}, STOP: {does: stop, takes_s: 1}}"
+    machines = f"machines: {{R: {{hand: HERE, positions: {{HERE: }}, commands: {commands}}}}}"
+    plant = PLANT_OF_NOTHING[: PLANT_OF_NOTHING.index("sensors:")].replace("machines: {}", machines)
+    with pytest.raises(InputError) as refusal:
+        close(net, parse_plant(plant.replace("[s]", "[s, R.breaks_off]"), "x.plant.yaml"))
+    found = [(one.code, one.subject, str(one.span or "")) for one in refusal.value.diagnostics]
+    assert found == [
+        ("F2001", ("stations", "1"), "x.plant.yaml:3:15"),
+        ("F2001", ("places", "halt/undone-raw"), ""),
+    ]
+    place, happening = (str(one) for one in refusal.value.diagnostics)
+    assert "'plant.R.breaks_off.raw' would name two things of the cell with its machines: R breaks off" in place
+    assert "; and a raw workpiece lies on R.breaks_off" in place
+    assert "rename 'R.breaks_off'" in place
+    assert "'R/done/halt/undone-raw' would name two things" in happening
+
+
 PLANT_OF_NOTHING = """\
 firable_plant: 1
 plant: nothing
