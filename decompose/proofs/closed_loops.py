@@ -22,8 +22,15 @@ from firable.analysis.loop.families import Answered, Family
 from firable.analysis.loop.faults import ask_faults
 from firable.analysis.loop.verdicts import LIVE, ask_loop, without
 from firable.decompose.proofs.held_gates import EVIDENCE, held_gates
+from firable.decompose.verification.happenings import Plant
+from firable.decompose.verification.plant import UncomparedError
+from firable.decompose.verification.same_loop import compare
 from firable.nets.decomposition import Decomposition
-from firable.nets.machines.plant_file import parse_plant
+from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.machines.closing import close
+from firable.nets.machines.loop import Faults, Sending
+from firable.nets.machines.plant_file import PlantModel, parse_plant
+from firable.nets.net import Net
 from firable.nets.verdict import Status, Verdict, Weight
 
 PREFIXES: Final = ("o4.", "loop.", "fault.")
@@ -40,9 +47,10 @@ def sealed_loops(
     """The verdicts on a net with the machines of a plant file, given as its text, and the files that they name.
 
     `limits` are those of each document. A verdict of which a part is not shown names no evidence. Raises `InputError`
-    as `close` does, and as `check` does.
+    as `close` does, and as `check` does, and F4003 where a loop could not be held against the plant file again.
     """
     net, model = decomposition.net, parse_plant(plant)
+    _see_compared(net, model)
     sealing = _Sealing(plant, limits)
     held = held_gates(decomposition, model)
     sealing.add(EVIDENCE, held.asked, held.verdicts)
@@ -54,6 +62,20 @@ def sealed_loops(
         if asked is not None:
             sealing.add(file, asked, asked.verdicts)
     return tuple(sealing.verdicts), sealing.files
+
+
+def _see_compared(net: Net, model: PlantModel) -> None:
+    """See, before anything is explored, that who checks the bundle can hold each loop against the plant file.
+
+    Raises `InputError` F4003 where one is too large for that.
+    """
+    for sending, faults in ((Sending.LATE, Faults.NONE), *((Sending.AT_ONCE, faults) for faults in Faults)):
+        try:
+            compare(Plant(net, model, sending, faults), close(net, model, faults, sending))
+        except UncomparedError as error:
+            message = f"nobody could see again whether the loop is what the plant file says: {error}"
+            hint = "do less in one firing: send the commands one after the other, in transitions of their own"
+            raise InputError([Diagnostic("F4003", message, hint, ("transitions", error.happening))]) from None
 
 
 class _Sealing:

@@ -38,7 +38,12 @@ class DiffersError(Exception):
 
 
 class UncomparedError(Exception):
-    """Whether the net of the loop is what the plant file says would have to be asked in too many states."""
+    """Whether the net of the loop is what the plant file says would have to be asked in too many states of one thing
+    that happens, which has the name `happening`."""
+
+    def __init__(self, happening: str) -> None:
+        super().__init__(f"'{happening}' looks at more things than are compared")
+        self.happening = happening
 
 
 @dataclass(frozen=True)

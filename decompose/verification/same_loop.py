@@ -104,7 +104,7 @@ def compare_one(plant: Plant, name: str, transitions: Sequence[Transition]) -> i
             open_ += ((_State({**state, **more}), left) for more in plant.ways_to_know(str(error), state))
             continue
         if (count := count + 1) > STATES_MAX:
-            raise UncomparedError(f"'{name}' looks at more things than are compared")
+            raise UncomparedError(name)
     return count
 
 

@@ -14,6 +14,7 @@ from firable.analysis.check import check
 from firable.analysis.evidence.document import Document, Record, document_from_text
 from firable.analysis.goal import Limits
 from firable.decompose.bundling import make_bundle
+from firable.decompose.proofs import closed_loops
 from firable.decompose.proofs.closed_loops import sealed_loops
 from firable.decompose.splitting.cut import split
 from firable.decompose.verification import documents, machines, same_loop
@@ -199,6 +200,15 @@ def test_a_loop_too_large_to_be_compared_is_no_mistake_of_the_bundle(monkeypatch
         InputError, match=r"it cannot be seen here whether the loop with 'plant\.yaml' is what that says"
     ):
         check_bundle(bundled())
+
+
+def test_no_bundle_is_made_of_a_loop_too_large_to_be_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(same_loop, "STATES_MAX", 10)
+    monkeypatch.setattr(closed_loops, "held_gates", None)  # nothing is explored before
+    with pytest.raises(InputError, match="'G2' looks at more things than are compared") as refusal:
+        make_bundle(check(catalogue_net("one_robot")), plant=plant())
+    (problem,) = refusal.value.diagnostics
+    assert (problem.code, problem.subject) == ("F4003", ("transitions", "G2"))
 
 
 def test_the_machines_of_another_cell_are_refused() -> None:
