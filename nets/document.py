@@ -29,6 +29,13 @@ def _as_list(value: object) -> object:
     return [value] if isinstance(value, str) else value
 
 
+def _given(value: object) -> object:
+    # Nor is it what holds where the key is left out: `to:` alone is a name forgotten.
+    if value is None:
+        raise PydanticCustomError("nothing_given", "nothing")
+    return value
+
+
 def as_integer(value: object) -> object:
     """A text of digits as the number it is; anything else as it was."""
     # The reader resolves no numbers, so that a name such as `007` stays as it is written.
@@ -52,6 +59,8 @@ def _as_pair(value: object) -> object:
 
 Name = Annotated[str, Field(min_length=1)]
 Names = Annotated[list[Name], BeforeValidator(_as_list, json_schema_input_type=Name | list[Name])]
+OptionalName = Annotated[Name | None, BeforeValidator(_given, json_schema_input_type=Name)]
+OptionalNames = Annotated[Names | None, BeforeValidator(_given, json_schema_input_type=Name | list[Name])]
 Text = str
 Integer = Annotated[int, BeforeValidator(as_integer, json_schema_input_type=int)]
 FormulaText = Annotated[str, BeforeValidator(_as_formula, json_schema_input_type=str | bool)]
@@ -101,7 +110,7 @@ class WithinDocument(StrictDocument):
     """How long the completion may take, and names for what that gives; the time alone is the short form."""
 
     time: str = Field(json_schema_extra={"pattern": TIME_PATTERN}, description="Such as 5s, 500ms or 2min.")
-    to: Name | None = Field(default=None, description="The fault place, one of `places`; else PLACE_fault.")
+    to: OptionalName = Field(default=None, description="The fault place, one of `places`; else PLACE_fault.")
     transition: Name | None = Field(default=None, description="The fault transition; else CONTROLLER.PLACE_timeout.")
     timer: Name | None = Field(default=None, description="The signal that the time is over; else PLACE_overdue.")
 

@@ -14,6 +14,8 @@ from firable.nets.document import (
     CommandDocument,
     Name,
     Names,
+    OptionalName,
+    OptionalNames,
     StrictDocument,
     TaskUseDocument,
     Text,
@@ -30,7 +32,7 @@ class StepWithinDocument(StrictDocument):
     """How long a step may take, and the step of the same role that comes then; the time alone is the short form."""
 
     time: str = Field(json_schema_extra={"pattern": TIME_PATTERN}, description="Such as 5s, 500ms or 2min.")
-    to: Name | None = Field(default=None, description="The fault step; else STEP_fault, which need not be declared.")
+    to: OptionalName = Field(default=None, description="The fault step; else STEP_fault, which need not be declared.")
 
 
 class StepDocument(StrictDocument):
@@ -74,7 +76,7 @@ class MoveDocument(StrictDocument):
 class StartDocument(StrictDocument):
     """How the task starts: on which steps (by default the first of each role), and with which gates."""
 
-    targets: Names | None = Field(default=None, alias="to")
+    targets: OptionalNames = Field(default=None, alias="to")
     permissive: Names = Field(default=_NO_NAMES, alias="if")
     inhibitive: Names = Field(default=_NO_NAMES, alias="unless")
     release: Names = Field(default=_NO_NAMES, description="The roles that a first subtask releases.")
@@ -84,7 +86,7 @@ class StartDocument(StrictDocument):
 class EndDocument(StrictDocument):
     """How the task ends: from which steps (by default the last of each role that is not released)."""
 
-    sources: Names | None = Field(default=None, alias="from")
+    sources: OptionalNames = Field(default=None, alias="from")
     permissive: Names = Field(default=_NO_NAMES, alias="if")
     inhibitive: Names = Field(default=_NO_NAMES, alias="unless")
     description: Text = ""

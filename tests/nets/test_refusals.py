@@ -154,6 +154,8 @@ TABLE = (
     net("sensor declared with its full name", ROBOT.replace("inputs: door", "inputs: robot.door")
         + T + "  t: {from: robot.free, if: robot.door_shut}\n", "F2021 11:29",
         "inside 'robot' names are local, so write 'door_shut' there"),
+    net("fault place with no name", ROBOT.replace("at_home}", "at_home, within: {time: 5s, to: }}"), "F1010 9:84",
+        "leave `to` out for what holds without it"),
     net("fault place with a full name", ROBOT.replace("at_home}", "at_home, within: {time: 5s, to: robot.free}}"),
         "F2002 9:88", "inside 'robot' names are local: write 'free'"),
     net("two tokens", "places: {p: }\nstart: [p, p]\n", "F2006 4:12", "a place holds one token at most"),

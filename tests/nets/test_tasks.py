@@ -104,6 +104,9 @@ REFUSALS = (
     ("an unknown step", "to: robot.take,", "to: robot.taek,", "F2025 16:31"),
     ("an unknown source", "from: robot.go,", "from: robot.gone,", "F2025 16:17"),
     ("an unknown role", "release: source", "release: sorce", "F2025 17:71"),
+    ("a start that leads nowhere", "{if: robot.near}", "{if: robot.near, to: }", "F1010 14:29"),
+    ("an end that comes from nowhere", "    moves:\n", "    end: {from: }\n    moves:\n", "F1010 15:11"),
+    ("a time limit with no step", '"{robot.prefix}there"}', "x, within: {time: 1s, to: }}", "F1010 9:111"),
     ("an unknown sensor", "if: robot.near", "if: robot.neer", "F2025 14:17"),
     ("a step as gate of the start", "if: robot.near", "if: robot.go", "F2025 14:17"),
     ("twice", "[robot.take, source.held]", "[robot.take, robot.take]", "F2007 17:34"),
@@ -129,6 +132,12 @@ def test_a_malformed_task_is_refused_where_it_is(old: str, new: str, found: str 
     said = [f"{d.code} {d.span.line}:{d.span.column}" for d in refused.value.diagnostics if d.span]
     assert any(one.startswith(found) for one in said), said
     assert all(d.hint for d in refused.value.diagnostics)
+
+
+def test_a_key_that_holds_something_else_where_it_is_left_out_is_told_so() -> None:
+    with pytest.raises(InputError, match=r"leave `to` out for what holds without it"):
+        parse_tasks(TASK.replace("{if: robot.near}", "{to: }"))
+    assert parse_tasks(TASK.replace("{if: robot.near}", "{to: []}"))["fetch"].start.targets == ()
 
 
 def test_all_mistakes_of_a_file_are_reported_together() -> None:
