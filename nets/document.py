@@ -119,7 +119,9 @@ class PlaceDocument(StrictDocument):
     """A place; nothing after its name is a place without a command."""
 
     send: CommandDocument | None = Field(default=None, description="The command sent when a token enters.")
-    until: Name | None = Field(default=None, description="The completion signal that lets the token out.")
+    until: Name | None = Field(
+        default=None, description="The completion signal that lets the token out, by its local name."
+    )
     within: (
         Annotated[
             WithinDocument,
@@ -146,7 +148,7 @@ class ControllerDocument(StrictDocument):
     under: Name | None = Field(default=None, description="The coordinator above it, if not that of the whole net.")
     description: Text = Field(default="", description="What it controls, for a reader.")
     start: Names = Field(default=[], description="The places that hold a token at first.")
-    inputs: Names = Field(default=[], description="The sensors, signals that no command clears.")
+    inputs: Names = Field(default=[], description="The sensors, signals that no command clears, by their local names.")
     places: Places | None = Field(default=None, description="Its places, called `controller.place` elsewhere.")
 
 

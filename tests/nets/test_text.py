@@ -18,6 +18,7 @@ from firable.nets.net import (
     SignalKind,
     TemporalProperty,
 )
+from firable.nets.printing import format_net
 from firable.nets.temporal import Logic, format_temporal
 from firable.nets.text import parse_net
 
@@ -134,3 +135,10 @@ def test_nets_with_long_chains_of_aliases_are_refused_before_they_grow() -> None
     with pytest.raises(InputError) as refused:
         net(bomb)
     assert [problem.code for problem in refused.value.diagnostics] == ["F1007"]
+
+
+def test_a_signal_under_a_controller_is_local_whatever_its_name_begins_with() -> None:
+    places = "    places: {up: , down: {send: {machine: P, command: DOWN}, until: press.pressed}}\n"
+    found = net("controllers:\n  press:\n    inputs: [press.shut, pressed]\n" + places)
+    assert [signal.name for signal in found.signals] == ["press.press.shut", "press.pressed", "press.press.pressed"]
+    assert parse_net(format_net(found)) == found  # so a name that begins so cannot be refused
