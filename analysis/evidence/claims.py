@@ -161,9 +161,8 @@ def is_marking(net: Net, marking: Marking) -> Formula:
     """The state formula "this is the marking": `start` of M0, else all places as they are."""
     if marking == net.initial_marking:
         return Start()
-    return And(
-        tuple(Holds(p.name) if marking >> i & 1 else Not(Holds(p.name)) for i, p in enumerate(net.places)),
-    )
+    literals = tuple(Holds(p.name) if marking >> i & 1 else Not(Holds(p.name)) for i, p in enumerate(net.places))
+    return literals[0] if len(literals) == 1 else And(literals)
 
 
 def marking_of(net: Net, formula: Formula) -> Marking | None:
@@ -176,10 +175,11 @@ def marking_of(net: Net, formula: Formula) -> Marking | None:
     """
     if formula == Start():
         return net.initial_marking
-    if not isinstance(formula, And) or len(formula.operands) != len(net.places):
+    literals = formula.operands if isinstance(formula, And) else (formula,)
+    if len(literals) != len(net.places):
         return None
     marking = 0
-    for operand in formula.operands:
+    for operand in literals:
         if isinstance(operand, Holds):
             marking |= 1 << net.place_index[operand.place]
     return marking if formula == is_marking(net, marking) else None

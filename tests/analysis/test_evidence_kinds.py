@@ -227,6 +227,13 @@ def test_a_formula_means_the_same_of_a_net_that_starts_elsewhere(net: Net, marki
     )
 
 
+def test_the_home_marking_of_a_net_of_one_place_is_shown() -> None:
+    one = Net("one", (Place("a", marked=True),), (Transition("t", ("a",)),))
+    checked = {found.record.name: found for found in check_document(evidence_of_report(check(one)))}
+    assert checked["home-markings"].record.proved
+    assert checked["home-markings"].shown
+
+
 # --------------------------------------------------------------------------------------------------------------------
 # Forgeries
 
