@@ -17,6 +17,7 @@ from firable.analysis.temporal.queries import as_goal
 from firable.nets.formula import Formula
 from firable.nets.net import Net
 from firable.nets.temporal import Temporal, TemporalAnd, TemporalNot, TemporalOr
+from firable.nets.verdict import Witness
 from firable.semantics.algebra import BOOL
 from firable.semantics.formulas import evaluate
 from firable.semantics.player import holds_in
@@ -50,8 +51,9 @@ def combined(net: Net, formula: Temporal, reached: Reached) -> Value:
 
     >>> from firable.nets.catalogue import catalogue_net
     >>> from firable.nets.temporal import parse_temporal
-    >>> combined(catalogue_net("one_robot"), parse_temporal("robot.free or AG robot.free"), lambda goal: None)
-    (True, None)
+    >>> holds, shown = combined(catalogue_net("one_robot"), parse_temporal("start or AG start"), lambda goal: None)
+    >>> holds, shown.method
+    (True, 'the initial marking')
     """
     match formula:
         case TemporalNot(operand):
@@ -62,7 +64,9 @@ def combined(net: Net, formula: Temporal, reached: Reached) -> Value:
         case TemporalOr(operands):
             return _first(net, operands, reached, decisive=True)
     if isinstance(formula, Formula):
-        return bool(evaluate(BOOL, net, formula, holds_in(net.initial_marking))), None
+        start = Witness(marking=net.names(net.initial_marking))
+        holds = bool(evaluate(BOOL, net, formula, holds_in(net.initial_marking)))
+        return holds, Finding(holds, "the initial marking", witness=start)
     if (goal := as_goal(formula)) is None:
         raise ValueError("a formula that is not put together from goals")
     finding = reached(goal[0])

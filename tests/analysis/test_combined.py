@@ -5,12 +5,15 @@ from __future__ import annotations
 import random
 
 import pytest
+from support.evidence_examples import LOOP
 from support.lively_nets import lively_net, part_of
 from support.naive_space import NaiveSpace
 
 from firable.analysis import check as module
 from firable.analysis._engine import IncompleteGraph
 from firable.analysis.check import check
+from firable.analysis.evidence.checking.checker import check_document
+from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.goal import Finding
 from firable.analysis.verdicts.combined import combined, is_combined
 from firable.nets.catalogue import catalogue_net
@@ -70,7 +73,18 @@ def test_a_part_that_nobody_decides_matters_only_where_the_others_leave_it_open(
         ("robot.free and EF not robot.free", None),
         ("not (robot.free and EF not robot.free)", None),
     ):
-        assert combined(net, parse_temporal(text), nobody) == (expected, None)
+        holds, shown = combined(net, parse_temporal(text), nobody)
+        assert holds is expected
+        assert (shown is None) is (expected is None)
+
+
+@pytest.mark.parametrize("text", ["b", "a and b", "G a and b"])
+def test_what_fails_in_the_initial_marking_is_refuted_by_a_run_from_there(text: str) -> None:
+    query = Query("q", QueryKind.LTL, parse_temporal(text))
+    report = check(LOOP, method="k-induction", queries=[query])
+    assert report.verdict("query.q").status is Status.VIOLATED
+    shown = {one.record.name: one.shown for one in check_document(evidence_of_report(report, [query]))}
+    assert shown["query.q"]
 
 
 def test_disjunctions_of_linear_time_are_not_taken_apart() -> None:
