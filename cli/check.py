@@ -279,7 +279,7 @@ def _found(net: Net, asked: _Asked, queries: Sequence[Query]) -> tuple[CheckRepo
         figures["structure"] = structure_json(
             net, contact_free=contact_free, seconds=asked.budget.seconds, discipline=asked.discipline
         )
-    return found, Kept(explained(found), figures, found.course)
+    return found, Kept(explained(found, queries), figures, found.course)
 
 
 def _traces(net: Net, verdicts: Iterable[Verdict], discipline: str) -> dict[str, str]:

@@ -11,9 +11,10 @@ them is the point of no return of some runs. A cure takes these firings away, an
 
 Nothing follows from the zone alone: a change makes new deadlocks, or forbids what shall happen. So every candidate is
 explored, and those that pass are checked whole. The violated verdict must come out proved, and what was proved must
-stay so; no transition may become dead, or not live, that was not. Three losses are left to the engineer, and told: a
+stay so; no transition may become dead, or not live, that was not. Four losses are left to the engineer, and told: a
 marking that the file wants reachable may be the very one that blocks the cell; a shared place brings a conflict to
-decide; and what is brought back to life may starve by the order of the file.
+decide; what is brought back to life may starve by the order of the file; and a query is a question, which need not hold
+(it may ask whether the deadlock is reachable). So queries choose no candidate, and are asked again of what is offered.
 
 What is offered is the smallest change that loses nothing, or else the smallest that passes (a gate counts one, a place
 and each of its arcs one); among those of one size the one that cures most, then the one that keeps most markings; and
@@ -25,7 +26,7 @@ Rejected: regions and integer programs, which find monitors with weights; a plac
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, islice, product
 from typing import Any, Final, Generic
@@ -36,11 +37,13 @@ from firable.analysis.methods import Method
 from firable.analysis.report import CheckReport
 from firable.analysis.spaces.reachability import Budget, explore
 from firable.analysis.spaces.space import S, StateSpace
+from firable.analysis.temporal.queries import answer
 from firable.analysis.verdicts.goals import goals_of
 from firable.nets.changes import Arbitration, Change, Gate, capacity, changed, free_name
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import Or
 from firable.nets.net import Arbiter, Net, Property, PropertyKind
+from firable.nets.queries import Query
 from firable.nets.verdict import Cure, Status, Verdict, Weight
 from firable.semantics.conflict import conflicts
 from firable.semantics.player import Player
@@ -62,18 +65,18 @@ _ALIKE_MAX: Final = 8  # changes of one size that are compared
 _Changes = tuple[Change, ...]
 
 
-def explained(report: CheckReport) -> tuple[Verdict, ...]:
+def explained(report: CheckReport, queries: Sequence[Query] = ()) -> tuple[Verdict, ...]:
     """The verdicts of a report; deadlocks with who waits for whom, violated ones with the changes that cure them.
 
-    Cures are looked for where all markings are known and at most `MARKINGS_MAX`, under interleaving, and the budget of
-    the report has room for what is asked of them.
+    `queries` are those that the report answers. Cures are looked for where all markings are known and at most
+    `MARKINGS_MAX`, under interleaving, and the budget of the report has room for what is asked of them.
     """
     told = tuple(with_circle(report.net, verdict) for verdict in report.verdicts)
     space = report.space
     if report.discipline is not Discipline.INTERLEAVING or not space.complete or space.n_markings > MARKINGS_MAX:
         return told
     try:
-        search = _Search(space, {verdict.name: verdict for verdict in told})
+        search = _Search(space, {verdict.name: verdict for verdict in told}, queries)
         return tuple(replace(verdict, cures=search.cures(verdict)) for verdict in told)
     except BudgetExceeded:
         return told
@@ -120,8 +123,8 @@ class _Cured:
 class _Search(Generic[S]):
     """The changes of one net that are tried, and what was found of them."""
 
-    def __init__(self, space: StateSpace[S], before: dict[str, Verdict]) -> None:
-        self._space, self._net, self._before = space, space.net, before
+    def __init__(self, space: StateSpace[S], before: dict[str, Verdict], queries: Sequence[Query]) -> None:
+        self._space, self._net, self._before, self._queries = space, space.net, before, queries
         self._fired = _fired(space)
         self._explored = self._checked = self._checked_nets = self._searches = 0
         self._after: dict[_Changes, CheckReport | None] = {}
@@ -141,7 +144,7 @@ class _Search(Generic[S]):
         self._searches += 1
         self._explored = self._checked = self._checked_nets = 0
         found = (self._best(verdict.name, kind) for kind in self._kinds(verdict))
-        cured = sorted((one for one in found if one is not None), key=_rank)
+        cured = sorted((self._asked_again(one) for one in found if one is not None), key=_rank)
         self._found.append(tuple(cured))
         return tuple(one.told(verdict.name) for one in cured)
 
@@ -279,12 +282,24 @@ class _Search(Generic[S]):
         after = self._after[changes]
         if after is None:
             return None
-        pairs = [(self._before[verdict.name], verdict) for verdict in after.verdicts if verdict.name in self._before]
-        proves = tuple(before.name for before, ended in pairs if _is_cured(before, ended))
-        lost = [ended for before, ended in pairs if _is_lost(before, ended)]
+        proves, lost = self._compared(after.verdicts)
         if name not in proves or not all(map(self._is_bearable, lost)):
             return None
         return _Cured(changes, proves, tuple(ended.name for ended in lost), after.figures.markings)
+
+    def _asked_again(self, one: _Cured) -> _Cured:
+        """The same with what becomes of the queries."""
+        after = self._after[one.changes]
+        if after is None:
+            raise ValueError("a change that was not checked is no cure")
+        proves, lost = self._compared(answer(after.space, query) for query in self._queries)
+        return replace(one, proves=(*one.proves, *proves), loses=(*one.loses, *(ended.name for ended in lost)))
+
+    def _compared(self, after: Iterable[Verdict]) -> tuple[tuple[str, ...], list[Verdict]]:
+        """Which verdicts are cured, by name, and which end worse than before."""
+        pairs = [(self._before[verdict.name], verdict) for verdict in after if verdict.name in self._before]
+        proves = tuple(before.name for before, ended in pairs if _is_cured(before, ended))
+        return proves, [ended for before, ended in pairs if _is_lost(before, ended)]
 
     def _checked_whole(self, changes: _Changes) -> CheckReport | None:
         """The report on the changed net; None where exploring it says enough, or too much was checked already."""

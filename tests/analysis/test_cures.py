@@ -19,6 +19,7 @@ from firable.nets.changes import Arbitration, CapacityPlace, Change, Gate, capac
 from firable.nets.editing import edits
 from firable.nets.net import Arbiter, Net, Place, Transition
 from firable.nets.printing import format_net, in_file_order
+from firable.nets.queries import parse_query
 from firable.nets.source import Source
 from firable.nets.text import parse_net
 from firable.nets.verdict import Cure, Status, Verdict, Weight, Witness
@@ -48,6 +49,25 @@ def test_one_cure_is_told_of_all_verdicts_that_it_cures() -> None:
     for name in ("property.no_deadlock", "property.restart"):
         assert [cure.changes for cure in found[name].cures] == changes
         assert all("deadlock-free" in cure.proves and name not in cure.proves for cure in found[name].cures)
+
+
+def test_a_cure_tells_what_becomes_of_the_queries_and_is_none_the_less_offered() -> None:
+    texts = {"again": "EF deadlock", "ends": "AF deadlock", "never": "AG not deadlock"}
+    net = catalogue_net("one_robot_mc_late")
+    queries = [parse_query(text, name) for name, text in texts.items()]
+    before = check(net, queries=queries)
+    cures = {verdict.name: verdict.cures for verdict in explained(before, queries)}
+    assert [cure.changes for cure in cures["deadlock-free"]] == [
+        cure.changes for cure in _explained(net)["deadlock-free"].cures
+    ]
+    for cure in cures["deadlock-free"]:
+        after = check(changed(net, cure.parts), queries=queries)
+        for name in (f"query.{name}" for name in texts):
+            held, holds = (report.verdict(name).holds for report in (before, after))
+            assert (name in cure.loses) is (held and not holds)
+            assert (name in cure.proves) is (holds and not held)
+        assert "query.again" in cure.loses
+    assert [cure.changes for cure in cures["query.never"]] == [cure.changes for cure in cures["deadlock-free"]]
 
 
 def test_competitors_without_an_arbiter_are_offered_one() -> None:
