@@ -29,8 +29,8 @@ def _as_list(value: object) -> object:
     return [value] if isinstance(value, str) else value
 
 
-def _given(value: object) -> object:
-    # Nor is it what holds where the key is left out: `to:` alone is a name forgotten.
+def given(value: object) -> object:
+    """What stands behind a key, which may be left out, but not be alone: `until:` is a name forgotten, not none."""
     if value is None:
         raise PydanticCustomError("nothing_given", "nothing")
     return value
@@ -48,7 +48,7 @@ def _as_formula(value: object) -> object:
 
 def as_time(value: object) -> object:
     """A time alone as the mapping that says it."""
-    return {"time": value} if isinstance(value, str) else value
+    return {"time": value} if isinstance(value, str) else given(value)
 
 
 def _as_pair(value: object) -> object:
@@ -59,8 +59,8 @@ def _as_pair(value: object) -> object:
 
 Name = Annotated[str, Field(min_length=1)]
 Names = Annotated[list[Name], BeforeValidator(_as_list, json_schema_input_type=Name | list[Name])]
-OptionalName = Annotated[Name | None, BeforeValidator(_given, json_schema_input_type=Name)]
-OptionalNames = Annotated[Names | None, BeforeValidator(_given, json_schema_input_type=Name | list[Name])]
+OptionalName = Annotated[Name | None, BeforeValidator(given, json_schema_input_type=Name)]
+OptionalNames = Annotated[Names | None, BeforeValidator(given, json_schema_input_type=Name | list[Name])]
 Text = str
 Integer = Annotated[int, BeforeValidator(as_integer, json_schema_input_type=int)]
 FormulaText = Annotated[str, BeforeValidator(_as_formula, json_schema_input_type=str | bool)]
@@ -111,28 +111,27 @@ class WithinDocument(StrictDocument):
 
     time: str = Field(json_schema_extra={"pattern": TIME_PATTERN}, description="Such as 5s, 500ms or 2min.")
     to: OptionalName = Field(default=None, description="The fault place, one of `places`; else PLACE_fault.")
-    transition: Name | None = Field(default=None, description="The fault transition; else CONTROLLER.PLACE_timeout.")
-    timer: Name | None = Field(default=None, description="The signal that the time is over; else PLACE_overdue.")
+    transition: OptionalName = Field(default=None, description="The fault transition; else CONTROLLER.PLACE_timeout.")
+    timer: OptionalName = Field(default=None, description="The signal that the time is over; else PLACE_overdue.")
+
+
+OptionalCommand = Annotated[CommandDocument | None, BeforeValidator(given, json_schema_input_type=CommandDocument)]
 
 
 class PlaceDocument(StrictDocument):
     """A place; nothing after its name is a place without a command."""
 
-    send: CommandDocument | None = Field(default=None, description="The command sent when a token enters.")
-    until: Name | None = Field(
+    send: OptionalCommand = Field(default=None, description="The command sent when a token enters.")
+    until: OptionalName = Field(
         default=None, description="The completion signal that lets the token out, by its local name."
     )
-    within: (
-        Annotated[
-            WithinDocument,
-            BeforeValidator(
-                as_time,
-                json_schema_input_type=WithinDocument
-                | Annotated[str, Field(json_schema_extra={"pattern": TIME_PATTERN})],
-            ),
-        ]
-        | None
-    ) = Field(default=None, description="How long the completion may take before the token goes to a fault place.")
+    within: Annotated[
+        WithinDocument | None,
+        BeforeValidator(
+            as_time,
+            json_schema_input_type=WithinDocument | Annotated[str, Field(json_schema_extra={"pattern": TIME_PATTERN})],
+        ),
+    ] = Field(default=None, description="How long the completion may take before the token goes to a fault place.")
     task: TaskUseDocument | None = Field(default=None, description="The registered task that the place stands for.")
     opens: ResourceDocument | None = Field(default=None, description="The resource that the place stands for.")
     description: Text = Field(default="", description="What is so, or is being done, while a token is here.")
@@ -145,7 +144,7 @@ class ControllerDocument(StrictDocument):
     """A controller: what is nested in it is owned by it."""
 
     coordinator: bool = Field(default=False, description="Whether it coordinates the others.")
-    under: Name | None = Field(default=None, description="The coordinator above it, if not that of the whole net.")
+    under: OptionalName = Field(default=None, description="The coordinator above it, if not that of the whole net.")
     description: Text = Field(default="", description="What it controls, for a reader.")
     start: Names = Field(default=[], description="The places that hold a token at first.")
     inputs: Names = Field(default=[], description="The sensors, signals that no command clears, by their local names.")

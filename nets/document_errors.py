@@ -292,7 +292,7 @@ def _wanted(kind: str, context: Mapping[str, Any], node: Node, path: Path) -> st
         case "model_type" if path[-1:] == ("within",):
             return "a time is expected, such as `5s`, or a mapping with `time: 5s`"
         case "nothing_given":
-            return f"write a name, or leave `{path[-1]}` out for what holds without it"
+            return f"write it, or leave `{path[-1]}` out for what holds without it"
         case "string_type" if is_word:
             return f'a name or text is expected: write "{text}" in double quotes if it is one'
         case "string_type" | "string_too_short":

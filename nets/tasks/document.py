@@ -11,9 +11,9 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import BeforeValidator, Field
 
 from firable.nets.document import (
-    CommandDocument,
     Name,
     Names,
+    OptionalCommand,
     OptionalName,
     OptionalNames,
     StrictDocument,
@@ -38,20 +38,17 @@ class StepWithinDocument(StrictDocument):
 class StepDocument(StrictDocument):
     """A step: a place of the machine in this role; its name is a template, by default the name of the step."""
 
-    place: Name | None = Field(default=None, description="The local name of the place, a template.")
-    send: CommandDocument | None = Field(default=None, description="The command sent when the step begins.")
-    until: Name | None = Field(default=None, description="The completion signal that ends it, a template.")
-    within: (
-        Annotated[
-            StepWithinDocument,
-            BeforeValidator(
-                as_time,
-                json_schema_input_type=StepWithinDocument
-                | Annotated[str, Field(json_schema_extra={"pattern": TIME_PATTERN})],
-            ),
-        ]
-        | None
-    ) = Field(default=None, description="How long the completion may take before a fault step comes.")
+    place: OptionalName = Field(default=None, description="The local name of the place, a template.")
+    send: OptionalCommand = Field(default=None, description="The command sent when the step begins.")
+    until: OptionalName = Field(default=None, description="The completion signal that ends it, a template.")
+    within: Annotated[
+        StepWithinDocument | None,
+        BeforeValidator(
+            as_time,
+            json_schema_input_type=StepWithinDocument
+            | Annotated[str, Field(json_schema_extra={"pattern": TIME_PATTERN})],
+        ),
+    ] = Field(default=None, description="How long the completion may take before a fault step comes.")
     description: Text = ""
 
 

@@ -154,6 +154,12 @@ TABLE = (
     net("sensor declared with its full name", ROBOT.replace("inputs: door", "inputs: robot.door")
         + T + "  t: {from: robot.free, if: robot.door_shut}\n", "F2021 11:29",
         "inside 'robot' names are local, so write 'door_shut' there"),
+    net("completion with no name", ROBOT.replace("until: at_home}", "until: }"), "F1010 9:49",
+        "leave `until` out for what holds without it"),
+    net("command of nothing", ROBOT.replace("at_home}", "at_home}\n      late: {send: }"), "F1010 10:14",
+        "leave `send` out for what holds without it"),
+    net("time limit without a time", ROBOT.replace("at_home}", "at_home, within: }"), "F1010 9:65",
+        "leave `within` out for what holds without it"),
     net("fault place with no name", ROBOT.replace("at_home}", "at_home, within: {time: 5s, to: }}"), "F1010 9:84",
         "leave `to` out for what holds without it"),
     net("fault place with a full name", ROBOT.replace("at_home}", "at_home, within: {time: 5s, to: robot.free}}"),
