@@ -16,7 +16,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -115,9 +115,18 @@ def _program() -> list[list[Any]]:
     import firable
 
     root = Path(firable.__file__).parent
-    rooms = [room for name in ("nets", "semantics", "analysis", "cli") if (room := root / name).is_dir()]
-    files = sorted(file for room in rooms for pattern in ("**/*.py", "*.so", "*.pyd") for file in room.glob(pattern))
+    files = sorted(file for name in ("nets", "semantics", "analysis", "cli") for file in _modules(root / name))
     return [[str(file.relative_to(root)), file.stat().st_size, file.stat().st_mtime_ns] for file in files]
+
+
+def _modules(package: Path) -> Iterator[Path]:
+    """The modules of a package; a folder that is none, such as that of the engine's source, is not looked into."""
+    if (package / "__init__.py").is_file():
+        for path in package.iterdir():
+            if path.suffix in {".py", ".so", ".pyd"}:
+                yield path
+            elif path.is_dir():
+                yield from _modules(path)
 
 
 def _sha256(text: str) -> str:

@@ -48,8 +48,9 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     dist = tmp_path_factory.mktemp("dist")
     run(sys.executable, "-m", "build", "--sdist", "--outdir", dist, ROOT)
     (sdist,) = dist.iterdir()
-    # Always the same folder, so that cargo replaces what it built of an earlier one.
-    unpacked = TARGET / "sdist"
+    # Always the same folder, so that cargo replaces what it built of an earlier one; outside the rooms, whose modules
+    # other tests list meanwhile.
+    unpacked = ROOT / "build" / "sdist"
     shutil.rmtree(unpacked, ignore_errors=True)
     with tarfile.open(sdist) as archive:
         archive.extractall(unpacked, filter="data")

@@ -10,7 +10,9 @@ import pytest
 
 from firable.analysis.check import check
 from firable.analysis.report import CheckReport
+from firable.cli.cache import key_of
 from firable.cli.main import main
+from firable.nets.catalogue import catalogue_net
 from firable.nets.net import Net
 
 NET = """firable: 1
@@ -86,6 +88,24 @@ def test_another_net_or_question_is_another_answer(
     checked(folder, NET, capsys)
     checked(folder, NET.replace(*change), capsys, *options)
     assert len(explored) == 2
+
+
+def test_the_answer_goes_by_the_modules_of_the_program_and_by_nothing_that_lies_among_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def touch(*files: str) -> str:
+        for file in files:
+            path = tmp_path / file
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(file, encoding="utf-8")
+        return key_of(catalogue_net("one_robot"), {})
+
+    monkeypatch.setattr("firable.__file__", str(tmp_path / "__init__.py"))
+    before = touch("analysis/__init__.py", "analysis/check.py", "analysis/_engine.abi3.so", "cli/__init__.py")
+    assert touch("analysis/engine/target/sdist/check.py", "analysis/notes.txt", "executor/__init__.py") == before
+    for module in ("analysis/spaces/__init__.py", "analysis/_other.pyd", "cli/main.py", "nets/__init__.py"):
+        before, last = touch(module), before
+        assert before != last
 
 
 def test_a_damaged_entry_is_no_answer(folder: Path, explored: list[str], capsys: pytest.CaptureFixture[str]) -> None:
