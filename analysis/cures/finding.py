@@ -288,11 +288,14 @@ class _Search(Generic[S]):
         return _Cured(changes, proves, tuple(ended.name for ended in lost), after.figures.markings)
 
     def _asked_again(self, one: _Cured) -> _Cured:
-        """The same with what becomes of the queries."""
+        """The same with what becomes of the queries in the time that the report has; what stays open is no loss."""
         after = self._after[one.changes]
         if after is None:
             raise ValueError("a change that was not checked is no cure")
-        proves, lost = self._compared(answer(after.space, query) for query in self._queries)
+        space = after.space.until(self._space.deadline)
+        decided = [query for query in self._queries if self._before[f"query.{query.name}"].status is not Status.UNKNOWN]
+        answers = [answer(space, query) for query in decided]
+        proves, lost = self._compared(verdict for verdict in answers if verdict.status is not Status.UNKNOWN)
         return replace(one, proves=(*one.proves, *proves), loses=(*one.loses, *(ended.name for ended in lost)))
 
     def _compared(self, after: Iterable[Verdict]) -> tuple[tuple[str, ...], list[Verdict]]:

@@ -6,7 +6,7 @@ import random
 import re
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 import pytest
 from support.examples import seeds
@@ -14,12 +14,16 @@ from support.lively_nets import lively_net
 
 from firable.analysis.check import check
 from firable.analysis.cures.finding import explained, with_circle
+from firable.analysis.deadline import Deadline
+from firable.analysis.spaces.reachability import Budget
+from firable.analysis.spaces.space import StateSpace
+from firable.analysis.temporal.queries import answer
 from firable.nets.catalogue import catalogue_net
 from firable.nets.changes import Arbitration, CapacityPlace, Change, Gate, capacity, changed, free_name
 from firable.nets.editing import edits
 from firable.nets.net import Arbiter, Net, Place, Transition
 from firable.nets.printing import format_net, in_file_order
-from firable.nets.queries import parse_query
+from firable.nets.queries import Query, parse_query
 from firable.nets.source import Source
 from firable.nets.text import parse_net
 from firable.nets.verdict import Cure, Status, Verdict, Weight, Witness
@@ -68,6 +72,27 @@ def test_a_cure_tells_what_becomes_of_the_queries_and_is_none_the_less_offered()
             assert (name in cure.proves) is (holds and not held)
         assert "query.again" in cure.loses
     assert [cure.changes for cure in cures["query.never"]] == [cure.changes for cure in cures["deadlock-free"]]
+
+
+def test_queries_are_asked_again_in_the_time_of_the_report_and_what_stays_open_is_no_loss(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[tuple[str, Deadline]] = []
+
+    def unknown(space: StateSpace[Any], query: Query) -> Verdict:
+        asked.append((query.name, space.deadline))
+        return replace(answer(space, query), status=Status.UNKNOWN)
+
+    monkeypatch.setattr("firable.analysis.cures.finding.answer", unknown)
+    queries = [parse_query("EF deadlock", name) for name in ("known", "open")]
+    report = check(catalogue_net("one_robot_mc_late"), budget=Budget(seconds=600.0), queries=queries)
+    verdicts = [replace(one, status=Status.UNKNOWN) if one.name == "query.open" else one for one in report.verdicts]
+    told = explained(replace(report, verdicts=tuple(verdicts)), queries)
+    cures = next(verdict.cures for verdict in told if verdict.name == "deadlock-free")
+    assert cures
+    assert not any(name.startswith("query.") for cure in cures for name in (*cure.loses, *cure.proves))
+    assert {name for name, _ in asked} == {"known"}
+    assert {deadline for _, deadline in asked} == {report.space.deadline}
 
 
 def test_competitors_without_an_arbiter_are_offered_one() -> None:
