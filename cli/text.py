@@ -189,7 +189,7 @@ def _witness(net: Net, name: str, witness: Witness, told: dict[tuple[object, ...
             yield f"then {witness.note}"
         return
     key = (witness.firings, witness.cycle)
-    if key in told:
+    if key in told and (witness.firings or witness.cycle):
         yield f"by the same firings as {told[key]}" + (f": {witness.note}" if witness.note else "")
         return
     told[key] = name

@@ -465,3 +465,15 @@ def test_a_net_file_is_written_under_no_name_by_which_it_is_not_read(
         said = f"'{name}' is not named like a net file: name a file *.firable.yaml"
         assert said in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_fails_before_anything_fires_is_not_told_by_the_firings_of_another(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "cell.firable.yaml"
+    path.write_text("firable: 1\ncell: c\nplaces: {a: , b: }\nstart: a\ntransitions: {t: {from: a, to: b}}\n", "utf-8")
+    queries = ("--query", "ctl b and EF a", "--query", "ctl not a and EF b")
+    assert main(["check", str(path), "--method", "k-induction", *queries]) == 1
+    out = capsys.readouterr().out
+    assert out.count("already in the initial marking:") == 2
+    assert "the same firings" not in out
