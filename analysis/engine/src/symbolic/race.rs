@@ -14,7 +14,7 @@
 //!
 //! The candidates come as an order and its reverse. Where the direction matters, it soon shows, and then it is everything;
 //! where it does not, the two are *twins*: the net looks the same from both ends, and one search says what the other
-//! would. So do those of two ways to lay a ring out. So where two stand at the same level with as many nodes after two
+//! would. Two ways to lay a ring out are twins as well. So where two stand at the same level with as many nodes after two
 //! rounds in succession, the second drops out.
 
 use super::cache::ANY;
@@ -164,13 +164,15 @@ fn stand_alike(one: &Racer, other: &Racer) -> bool {
     begun && level == other_level && nodes.abs_diff(other_nodes) <= nodes.max(other_nodes) / TWINS_APART
 }
 
-/// Takes out the second of each two that have been twins for long enough. Of two that wait, standing still says nothing.
+/// Takes out the second of each two that have been twins for long enough, but none of the shortest order for another one.
+/// Of two that wait, standing still says nothing.
 fn drop_twins(field: &mut Vec<Racer>) {
     for at in (1..field.len()).rev() {
         if !field[at].ran {
             continue;
         }
-        let alike = field[..at].iter().any(|first| first.ran && stand_alike(first, &field[at]));
+        let may_go = |first: &Racer| first.ran && (first.is_shortest || !field[at].is_shortest);
+        let alike = field[..at].iter().any(|first| may_go(first) && stand_alike(first, &field[at]));
         field[at].alike = if alike { field[at].alike + 1 } else { 0 };
         if field[at].alike >= ROUNDS_ALIKE && field.len() > FINALISTS {
             field.remove(at);
@@ -375,6 +377,25 @@ mod tests {
             (0..4).for_each(|_| round(&mut racers, &transitions, |_| 200));
             assert_eq!(racers.len(), 2);
         }
+    }
+
+    #[test]
+    fn the_shortest_order_is_no_twin_of_another_one() {
+        let [along, back, across, _] = orders();
+        let turned: Order = (45..90).chain(0..45).collect();
+        for (is_shortest, left) in [(false, 2), (true, 3)] {
+            let (mut racers, transitions) = field(&[along.clone(), turned.clone(), across.clone()]);
+            racers.swap(0, 1);
+            racers[1].is_shortest = is_shortest;
+            (0..4).for_each(|_| round(&mut racers, &transitions, |_| 200));
+            assert_eq!(racers.len(), left);
+            assert_eq!(racers.iter().any(|racer| racer.order == along), is_shortest);
+        }
+        // Of both its directions one is enough.
+        let (mut racers, transitions) = field(&[along, back, across]);
+        racers[..2].iter_mut().for_each(|racer| racer.is_shortest = true);
+        (0..4).for_each(|_| round(&mut racers, &transitions, |_| 200));
+        assert_eq!(racers.len(), 2);
     }
 
     #[test]
