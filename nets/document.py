@@ -63,6 +63,9 @@ OptionalName = Annotated[Name | None, BeforeValidator(given, json_schema_input_t
 OptionalNames = Annotated[Names | None, BeforeValidator(given, json_schema_input_type=Name | list[Name])]
 Text = str
 Integer = Annotated[int, BeforeValidator(as_integer, json_schema_input_type=int)]
+OptionalNumber = Annotated[
+    Annotated[Integer, Field(ge=0)] | None, BeforeValidator(given, json_schema_input_type=Annotated[int, Field(ge=0)])
+]
 FormulaText = Annotated[str, BeforeValidator(_as_formula, json_schema_input_type=str | bool)]
 
 
@@ -132,8 +135,12 @@ class PlaceDocument(StrictDocument):
             json_schema_input_type=WithinDocument | Annotated[str, Field(json_schema_extra={"pattern": TIME_PATTERN})],
         ),
     ] = Field(default=None, description="How long the completion may take before the token goes to a fault place.")
-    task: TaskUseDocument | None = Field(default=None, description="The registered task that the place stands for.")
-    opens: ResourceDocument | None = Field(default=None, description="The resource that the place stands for.")
+    task: Annotated[TaskUseDocument | None, BeforeValidator(given, json_schema_input_type=TaskUseDocument)] = Field(
+        default=None, description="The registered task that the place stands for."
+    )
+    opens: Annotated[ResourceDocument | None, BeforeValidator(given, json_schema_input_type=ResourceDocument)] = Field(
+        default=None, description="The resource that the place stands for."
+    )
     description: Text = Field(default="", description="What is so, or is being done, while a token is here.")
 
 
@@ -154,7 +161,7 @@ class ControllerDocument(StrictDocument):
 class TransitionDocument(StrictDocument):
     """A transition; `if` and `unless` name places (internal gates) or signals (external gates)."""
 
-    number: Integer | None = Field(default=None, ge=0, description="The number in the coordinator table.")
+    number: OptionalNumber = Field(default=None, description="The number in the coordinator table.")
     inputs: Names = Field(default=_NO_NAMES, alias="from", description="The places of which it takes the tokens.")
     outputs: Names = Field(
         default=_NO_NAMES, alias="to", description="The places that it puts tokens on; it waits until they are empty."

@@ -300,7 +300,7 @@ class _Builder:
             elif node.text.lower() in {"no", "off", "false"} and not is_key:
                 hint += ", or false"
             elif node.text in {"null", "Null", "NULL", "~"} and not is_key:
-                hint += ", or leave the value empty"
+                hint += ", or leave the value empty, or the key out"
             self.problem(
                 "F1007",
                 f"{shown} is text for some YAML parsers and not for others",

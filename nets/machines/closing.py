@@ -94,13 +94,16 @@ class _Closing:
         They are put together of names by dots, hyphens and slashes, which may stand in each of these: so the longest
         one that somebody wrote is what reaches over a joint.
         """
+        signals = {signal: place.name for place in self.net.places for signal in place.cleared}
+        kinds = {kind.value: f"this {kind} of the net" for kind in SignalKind}  # the descriptions of their places
         made = (
             *((place.name, "this place of the net") for place in self.net.places),
-            *((place.name, place.description) for place in places),
+            *((place.name, kinds.get(place.description, place.description)) for place in places),
             *((one.name, f"a firing of '{name}'") for name, some in variants.items() for one in some),
             *((move.name, move.description) for move in moves),
         )
         written: dict[str, Path] = {
+            **{name: ("places", place) for name, place in signals.items()},
             **{name: ("places", name) for name in self.net.place_index},
             **{name: ("transitions", name) for name in self.net.transition_index},
             **{name: ("sensors", name) for name in self.model.sensors},
@@ -114,9 +117,10 @@ class _Closing:
                 continue
             cause = max((one for one in written if one in name), key=len, default="")
             path = written.get(cause, ())
+            renamed = f"'{cause}'" if cause else "one of them"
             span = None if path[:1] in {("places",), ("transitions",)} else self.model.span(path)
             message = f"'{name}' would name two things of the cell with its machines: {first[name]}; and {told}"
-            hint = f"rename '{cause}': the names there are put together of those of the net and of the plant"
+            hint = f"rename {renamed}: the names there are put together of those of the net and of the plant"
             yield Diagnostic("F2001", message, hint, tuple(map(str, path)), span)
 
     def timers_read(self) -> dict[str, Place]:
@@ -148,8 +152,11 @@ class _Closing:
         for transition in self.net.transitions:
             _assert_projects(self.net, transition, variants[transition.name])
         moves, times, places = tuple(self.moves()), tuple(self.times()), tuple(self.places())
-        if taken := (*self.alike(places, variants, (*moves, *times)), *_taken(self.net, (*moves, *times))):
-            raise InputError(taken)
+        alike = tuple(self.alike(places, variants, (*moves, *times)))
+        told = {problem.subject for problem in alike}
+        taken = (problem for problem in _taken(self.net, (*moves, *times)) if problem.subject not in told)
+        if problems := (*alike, *taken):
+            raise InputError(problems)
         _assert_apart(self.net, moves, times)
         moves += times
         net = Net(

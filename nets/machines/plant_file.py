@@ -26,6 +26,7 @@ from typing import Annotated, Final, Literal, get_args
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, ValidationError
 
 from firable.nets.diagnostics import Diagnostic, InputError, Span, Subject, did_you_mean
+from firable.nets.document import Name, OptionalName, given
 from firable.nets.document_errors import Shape, document_problems, keys_of, version_problem
 from firable.nets.net import Net, SignalKind
 from firable.nets.source import Source, quoted, read_source
@@ -46,7 +47,6 @@ def _version(value: object) -> object:
     return 1 if value == "1" else value
 
 
-Name = Annotated[str, Field(min_length=1)]
 Seconds = Annotated[float, BeforeValidator(_number), Field(ge=0, le=1e6, allow_inf_nan=False)]
 
 
@@ -64,7 +64,9 @@ class Failure(StrEnum):
 class _Timed(_Model):
     takes_s: Seconds
     jitter_s: Seconds = 0.0
-    may_fail: Annotated[Failure | None, Field(strict=False)] = None
+    may_fail: Annotated[Failure | None, Field(strict=False), BeforeValidator(given, json_schema_input_type=Failure)] = (
+        None
+    )
 
 
 class Move(_Timed):
@@ -147,7 +149,7 @@ _ACTIONS: Final[tuple[type[BaseModel], ...]] = get_args(get_args(Action)[0])
 class Machine(_Model):
     """A machine; one with a hand has positions, each in front of a station or of nothing."""
 
-    hand: Name | None = Field(default=None, description="The position where the hand is at first.")
+    hand: OptionalName = Field(default=None, description="The position where the hand is at first.")
     positions: dict[Name, Name | None] = {}
     commands: dict[Name, Action]
 
@@ -181,9 +183,9 @@ class Sensor(_Model):
     command to the machine releases it.
     """
 
-    occupied: Name | None = None
-    holding: Name | None = None
-    acknowledges: Name | None = None
+    occupied: OptionalName = None
+    holding: OptionalName = None
+    acknowledges: OptionalName = None
     after_s: Seconds = 0.0
     may_flicker: bool = False
     may_linger: bool = False

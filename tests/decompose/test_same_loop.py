@@ -82,7 +82,7 @@ def other_plants(model: PlantModel, seed: int) -> PlantModel:
             elif action["does"] == "stop":
                 action["takes_s"] = draw.choice([0.0, 1.0])
             else:
-                action["may_fail"] = draw.choice(["repairable", "for_good", None])
+                action.update(draw.choice([{"may_fail": "repairable"}, {"may_fail": "for_good"}, {}]))
     return PlantModel.model_validate(data)
 
 

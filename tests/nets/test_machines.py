@@ -223,6 +223,35 @@ transitions:
     assert "'R/done/halt/undone-raw' would name two things" in happening
 
 
+def test_a_completion_with_the_name_of_a_thing_of_the_plant_is_told_where_it_is_written_and_once() -> None:
+    text = "firable: 1\ncell: x\nplaces: {a: {send: {machine: M, command: GO}, until: plant.accident}}\n"
+    commands = "{GO: {does: work, takes_s: 1}}"
+    plant = PLANT_OF_NOTHING[: PLANT_OF_NOTHING.index("sensors:")].replace("{}", f"{{M: {{commands: {commands}}}}}")
+    with pytest.raises(InputError) as refusal:
+        close(parse_net(text), parse_plant(plant))
+    (problem,) = refusal.value.diagnostics
+    assert (problem.code, problem.subject) == ("F2001", ("places", "a"))
+    assert "this completion of the net; and something happened that must not" in problem.message
+    assert problem.hint.startswith("rename 'plant.accident':")
+    taken = parse_net(text.replace("plant.accident", "done") + "transitions: {M/done/a: }\n")
+    with pytest.raises(InputError) as refusal:
+        close(taken, parse_plant(plant))
+    (problem,) = refusal.value.diagnostics
+    assert (problem.code, problem.subject) == ("F2001", ("transitions", "M/done/a"))
+
+
+def test_who_has_a_key_that_stands_alone_is_asked_what_it_means() -> None:
+    commands = "{GO: {does: work, takes_s: 1, may_fail: }}"
+    plant = PLANT_OF_NOTHING.replace("{}", f"{{M: {{hand: , commands: {commands}}}}}").replace(
+        "plant.hand: {occupied: s}", "plant.hand: {holding: }"
+    )
+    with pytest.raises(InputError) as refusal:
+        parse_plant(plant)
+    found = [(one.code, one.hint) for one in refusal.value.diagnostics]
+    keys = ("hand", "may_fail", "holding")
+    assert found == [("F1010", f"write it, or leave `{key}` out for what holds without it") for key in keys]
+
+
 PLANT_OF_NOTHING = """\
 firable_plant: 1
 plant: nothing
