@@ -205,10 +205,9 @@ class Settling:
             asked.extend([] if finding is None else [finding])
             return finding
 
-        holds, shown = combined(self.net, formula, reached)
+        holds, witness = combined(self.net, formula, reached)
         if holds is None:
             return
-        witness = None if shown is None or shown.witness is None else shown.witness
         method = "; ".join(dict.fromkeys(finding.method for finding in asked)) or "the initial marking"
         cost = Cost(seconds=sum(finding.cost.seconds or 0.0 for finding in asked))
         question = Question(verdict.name, verdict.statement, verdict.weight)

@@ -25,8 +25,8 @@ from firable.semantics.player import holds_in
 Reached = Callable[[Formula], Finding | None]
 """What is found of a goal; None where that is not decided."""
 
-Value = tuple[bool | None, Finding | None]
-"""Whether a formula holds (None: not decided), and the finding that shows it, where one does."""
+Value = tuple[bool | None, Witness | None]
+"""Whether a formula holds (None: not decided), and the firing sequence that shows it, where one does."""
 
 
 def is_combined(formula: Temporal, *, branching: bool) -> bool:
@@ -52,33 +52,32 @@ def combined(net: Net, formula: Temporal, reached: Reached) -> Value:
     >>> from firable.nets.catalogue import catalogue_net
     >>> from firable.nets.temporal import parse_temporal
     >>> holds, shown = combined(catalogue_net("one_robot"), parse_temporal("start or AG start"), lambda goal: None)
-    >>> holds, shown.method
-    (True, 'the initial marking')
+    >>> holds, shown.firings, "robot.free" in shown.marking
+    (True, (), True)
     """
     match formula:
         case TemporalNot(operand):
-            holds, finding = combined(net, operand, reached)
-            return (None if holds is None else not holds), finding
+            holds, shown = combined(net, operand, reached)
+            return (None if holds is None else not holds), shown
         case TemporalAnd(operands):
             return _first(net, operands, reached, decisive=False)
         case TemporalOr(operands):
             return _first(net, operands, reached, decisive=True)
     if isinstance(formula, Formula):
-        start = Witness(marking=net.names(net.initial_marking))
         holds = bool(evaluate(BOOL, net, formula, holds_in(net.initial_marking)))
-        return holds, Finding(holds, "the initial marking", witness=start)
+        return holds, Witness(marking=net.names(net.initial_marking))
     if (goal := as_goal(formula)) is None:
         raise ValueError("a formula that is not put together from goals")
     finding = reached(goal[0])
-    return (None, None) if finding is None else (finding.reachable is goal[1], finding)
+    return (None, None) if finding is None else (finding.reachable is goal[1], finding.witness)
 
 
 def _first(net: Net, operands: tuple[Temporal, ...], reached: Reached, *, decisive: bool) -> Value:
     """The first operand with the decisive value decides, else all must be decided; what costs nothing comes first."""
     undecided = False
     for operand in sorted(operands, key=lambda operand: not isinstance(operand, Formula)):
-        holds, finding = combined(net, operand, reached)
+        holds, shown = combined(net, operand, reached)
         if holds is decisive:
-            return holds, finding
+            return holds, shown
         undecided = undecided or holds is None
     return (None if undecided else not decisive), None
