@@ -158,6 +158,7 @@ class Plant:
         """The keys that somebody has pressed."""
         self.faulted = False
         self.arrival_due = False
+        self.is_closed = False
         self.events: list[tuple[float, int, _Event]] = []
         """What will happen: when, a tie breaker, what."""
         self.sequence = 0
@@ -179,9 +180,15 @@ class Plant:
         return tuple(sorted(workpiece.id for workpiece in holders if workpiece is not None))
 
     def close(self) -> None:
-        """Let no more workpieces come."""
-        self.to_come = 0
-        self.arrival_due = False
+        """Let no more workpieces come, until it is opened."""
+        self.is_closed = True
+
+    def open(self, now_seconds: float) -> list[PlantReport]:
+        """Let workpieces come again; one that is due is there at once."""
+        self.now_seconds = now_seconds
+        self.is_closed = False
+        self._arrive()
+        return list(self._seen())
 
     def halt(self) -> None:
         """Stop every machine where it is: the safe output of the simulated cell."""
@@ -246,7 +253,7 @@ class Plant:
 
     def _arrive(self) -> None:
         arrivals = self.model.arrivals
-        if self.arrival_due and self.to_come and self.stations[arrivals.station] is None:
+        if self.arrival_due and self.to_come and not self.is_closed and self.stations[arrivals.station] is None:
             self.arrival_due = False
             self.to_come -= 1
             self.entered += 1

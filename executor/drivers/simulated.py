@@ -76,7 +76,7 @@ class SimulatedDriver:
             self._input(at_seconds, what, *arguments)
         self.log = log
         if log is not None and log.past:
-            self._input(log.end_seconds, "start")
+            self._start(log.end_seconds)
 
     @property
     def at_rest(self) -> bool:
@@ -162,12 +162,17 @@ class SimulatedDriver:
 
     def release(self) -> None:
         """Let machines be commanded again; what the stop has broken off stays so."""
-        self._input(self.clock.now_seconds() if self.clock is not None else 0.0, "start")
+        self._start(self.clock.now_seconds() if self.clock is not None else 0.0)
 
     def close(self) -> bool:
-        """Let no more workpieces come."""
+        """Let no more workpieces come in this life of the run; the next one does not end with the cycle."""
         self._input(self.clock.now_seconds() if self.clock is not None else 0.0, "close")
         return True
+
+    def _start(self, at_seconds: float) -> None:
+        self._input(at_seconds, "start")
+        if self.plant.is_closed:
+            self._input(at_seconds, "open")
 
     def _input(self, at_seconds: float, what: str, *arguments: str | int) -> None:
         """Do something to the cell, after it is in the log."""
@@ -180,6 +185,8 @@ class SimulatedDriver:
                 self._tell(at_seconds, self.plant.advance(at_seconds))
             case "close", ():
                 self.plant.close()
+            case "open", ():
+                self._tell(at_seconds, self.plant.open(at_seconds))
             case "stop", ():
                 self.stopped = True
                 self.plant.halt()

@@ -5,6 +5,7 @@ import io
 import random
 from collections.abc import Iterable
 from dataclasses import replace
+from pathlib import Path
 from typing import cast
 
 import pytest
@@ -20,8 +21,10 @@ from firable.executor.drivers.simulated import SimulatedDriver
 from firable.executor.operating.host import Host
 from firable.executor.operating.items import Item
 from firable.executor.operating.recorder import Recorder
+from firable.executor.operating.restart import uncertain
 from firable.executor.operating.running import Operator, RunReport, execute
 from firable.executor.operating.situation import State, is_deadlock
+from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.messages import ProtocolError
 from firable.executor.protocol.token_player import TokenPlayer
 from firable.nets.catalogue import catalogue_net, catalogue_path
@@ -308,6 +311,51 @@ def test_stop_at_the_end_of_the_cycle_leaves_an_empty_cell() -> None:
     assert report.inside == ()
     assert report.delivered == tuple(range(1, len(report.delivered) + 1))
     assert 1 < len(report.delivered) < 50
+
+
+async def reset_and_resume(host: Host) -> None:
+    """After an emergency stop, where what the machines were at is to be done anew; stop a run that does not end."""
+    assert host.reset() == ()
+    await asyncio.sleep(1.0)
+    for place in uncertain(host):
+        assert host.say(place, Answer.NOT_RECEIVED)
+    assert host.resume()
+    await asyncio.sleep(1000.0)
+    host.stop()
+
+
+def test_work_comes_in_again_after_an_emergency_stop_in_the_last_cycle() -> None:
+    async def operator(host: Host) -> None:
+        await asyncio.sleep(60.0)
+        host.stop(at_end_of_cycle=True)
+        await asyncio.sleep(1.0)
+        host.emergency_stop("a person")
+        await until(lambda: host.situation().state is State.LATCHED, "the latch")
+        await reset_and_resume(host)
+
+    report, _ = run_cell("one_robot", 6, operator=operator)
+    assert (report.state, report.delivered) == (State.DONE, tuple(range(1, 7)))
+
+
+def test_a_run_that_was_stopped_at_the_end_of_its_cycle_is_taken_up_with_the_work_that_is_to_come(
+    tmp_path: Path,
+) -> None:
+    async def operator(host: Host) -> None:
+        await asyncio.sleep(60.0)
+        host.stop(at_end_of_cycle=True)
+
+    def run_on(operator: Operator | None) -> RunReport:
+        cell, plant = decomposition_of("one_robot"), plant_of("one_robot")
+        return execute(
+            cell, plant, workpieces=6, operator=operator, journal_path=tmp_path / "cell.journal", resume=True
+        )
+
+    stopped = run_on(operator)
+    assert stopped.state is State.STOPPED
+    assert len(stopped.delivered) < 6
+    for _ in range(2):  # the second one finds nothing to do
+        report = run_on(None)
+        assert (report.state, report.delivered) == (State.DONE, tuple(range(1, 7)))
 
 
 def test_cancelled_run_is_an_operators_stop() -> None:
