@@ -163,6 +163,7 @@ class SimulatedDriver:
     def release(self) -> None:
         """Let machines be commanded again; what the stop has broken off stays so."""
         self._start(self.clock.now_seconds() if self.clock is not None else 0.0)
+        self.awake.set()  # what was due while they stood is due now
 
     def close(self) -> bool:
         """Let no more workpieces come in this life of the run; the next one does not end with the cycle."""

@@ -358,6 +358,20 @@ def test_a_run_that_was_stopped_at_the_end_of_its_cycle_is_taken_up_with_the_wor
         assert (report.state, report.delivered) == (State.DONE, tuple(range(1, 7)))
 
 
+def test_what_was_due_while_a_run_was_latched_happens_when_it_is_reset() -> None:
+    async def operator(host: Host) -> None:
+        await asyncio.sleep(100.0)  # the first workpiece has left, and the second has not come
+        host.emergency_stop("a person")
+        await asyncio.sleep(200.0)
+        await reset_and_resume(host)
+
+    text = catalogue_path("one_robot").with_name("one_robot.plant.yaml").read_text()
+    report, _ = run_cell(
+        "one_robot", 2, operator=operator, plant=parse_plant(text.replace("every_s: 8", "every_s: 200"))
+    )
+    assert (report.state, report.delivered) == (State.DONE, (1, 2))
+
+
 def test_cancelled_run_is_an_operators_stop() -> None:
     async def cancelled(host: Host) -> None:
         await asyncio.sleep(20.0)
