@@ -181,11 +181,15 @@ class Commands:
                 yield Sending(command.place, command.entry, again=True)
 
     def _in_order(self) -> list[tuple[str, Command]]:
-        """All that are kept, by their keys; those that share a completion by their entries, where the first stands."""
+        """All that are not over, by their keys; those that share a completion by their entries, where the first stands.
+
+        The place of one that is over may be none any more: after a takeover, by which its number goes on.
+        """
+        open_ = [(key, command) for key, command in self.newest.items() if command.stage is not Stage.OVER]
         first: dict[str, int] = {}
-        for command in self.newest.values():
+        for _, command in open_:
             first.setdefault(self._count_of(command), len(first))
-        return sorted(self.newest.items(), key=lambda kept: (first[self._count_of(kept[1])], kept[1].entry))
+        return sorted(open_, key=lambda kept: (first[self._count_of(kept[1])], kept[1].entry))
 
     def _count_of(self, command: Command) -> str:
         return self.subnet.place(command.place).completion or command.place

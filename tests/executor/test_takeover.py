@@ -11,7 +11,7 @@ from firable.executor.journal.takeover import take_over
 from firable.executor.links.link import COORDINATOR
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
-from firable.executor.protocol.messages import EPOCH_BITS, Keep, Stored, VoteRequest
+from firable.executor.protocol.messages import EPOCH_BITS, Keep, Sending, Stored, VoteRequest
 from firable.nets.diagnostics import InputError
 
 OTHER_COMMAND = OLD.replace("command: WORK", "command: GRIND")
@@ -106,8 +106,14 @@ def test_a_command_under_way_is_not_carried_to_a_net_in_which_its_machine_would_
 
 def test_a_place_that_is_renamed_is_no_matter_while_it_is_empty() -> None:
     old, new = cell(OLD), cell(OTHER_NAME)
-    moved = take_over(old, new, kept_in({"robot.free", "table.empty"}, old), [COORDINATOR])
+    over: dict[str, Stored] = {"command/signal/robot.worked": ("robot.working", 7, "over")}
+    moved = take_over(old, new, kept_in({"robot.free", "table.empty"}, old, robot=over), [COORDINATOR])
     assert joint_marking(new, moved.kept) == {"robot.free", "table.empty"}
+    robot = LocalController.restored(new, "robot", moved.kept["robot"])
+    assert robot.commands.questions == robot.commands.owed == ()
+    assert robot.resume() == []
+    entered = robot.commands.enter(new.net.place("robot.at_work"), held=False)
+    assert Sending("robot.at_work", 8) in entered
 
 
 def test_all_reasons_are_told_together() -> None:
