@@ -105,7 +105,7 @@ class Image:
                 self.readings[name] = replace(reading, quality=quality, why=why)
             case "fault":
                 self.readings[name] = replace(reading, quality=Quality.BAD, why=why)
-                return [name]
+                return [name] if reading.why != why else []  # or a device that is polled would be told of at each poll
             case "0" | "1":
                 self.readings[name] = replace(reading, value=policy == "1", quality=Quality.BAD, why=why)
         return []

@@ -70,6 +70,9 @@ def test_what_is_neither_0_nor_1_is_lost_by_the_policy_of_its_signal(
     assert (one.readings["s"].value, one.readings["s"].quality) == (value, quality)
     assert "'p' shows 7" in one.readings["s"].why
     assert one.readings["s"].at_seconds == 1.0
+    assert one.take([("p", 7)], 3.0) == ([], [])
+    one.take([("p", 1)], 4.0)
+    assert one.take([("p", 7)], 5.0)[1] == faults
 
 
 def test_completion_needs_the_acknowledgement_of_its_own_entry_and_its_sensor() -> None:
