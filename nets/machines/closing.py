@@ -110,6 +110,9 @@ class _Closing:
             **{name: ("stations", i) for i, name in enumerate(self.model.stations)},
             **{name: ("machines", name) for name in self.model.machines},
         }
+        if any(controller.name == PLANT for controller in self.net.controllers):
+            message = f"'{PLANT}' would name two controllers of the cell with its machines: this one, and who has these"
+            yield Diagnostic("F2001", message, f"rename '{PLANT}'", ("controllers", PLANT))
         first: dict[str, str] = {}
         for name, told in made:
             if name not in first:

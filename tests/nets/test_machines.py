@@ -240,6 +240,15 @@ def test_a_completion_with_the_name_of_a_thing_of_the_plant_is_told_where_it_is_
     assert (problem.code, problem.subject) == ("F2001", ("transitions", "M/done/a"))
 
 
+def test_a_controller_with_the_name_of_the_plant_is_told_that_the_machines_have_it() -> None:
+    net = parse_net("firable: 1\ncell: x\ncontrollers: {plant: {places: {a: }}}\n")
+    with pytest.raises(InputError) as refusal:
+        close(net, parse_plant(PLANT_OF_NOTHING[: PLANT_OF_NOTHING.index("sensors:")]))
+    (problem,) = refusal.value.diagnostics
+    assert (problem.code, problem.subject) == ("F2001", ("controllers", "plant"))
+    assert "'plant' would name two controllers of the cell with its machines" in problem.message
+
+
 def test_who_has_a_key_that_stands_alone_is_asked_what_it_means() -> None:
     commands = "{GO: {does: work, takes_s: 1, may_fail: }}"
     plant = PLANT_OF_NOTHING.replace("{}", f"{{M: {{hand: , commands: {commands}}}}}").replace(
