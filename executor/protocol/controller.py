@@ -156,7 +156,7 @@ class LocalController:
         owed = list(self.commands.resume(frozenset(self.subnet.names(self.marking))))
         self.held = False
         self._mark_unsent()
-        self.timers.begin_anew(self.word)
+        self.timers.begin_anew(self.word & ~self._uncommanded())
         return owed
 
     def receive(self, message: ToController) -> list[Effect]:
@@ -444,6 +444,12 @@ class LocalController:
         if self.untold and transition.reads & self.untold & ~self._locked_reads():
             return False
         return transition.enabled(self.word)
+
+    def _uncommanded(self) -> Word:
+        """The places with a time limit that never sent a command: a token of the start is there, and has no time."""
+        limited = self.timers.places.values()
+        names = (p.name for p in limited if p.completion is not None and not self.commands.entry(p.completion))
+        return sum(1 << self.subnet.place_index[name] for name in names)
 
     def _mark_unsent(self) -> None:
         self.unsent = sum(1 << self.subnet.place_index[place] for place in self.commands.unsent)

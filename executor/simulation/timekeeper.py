@@ -36,6 +36,7 @@ class Limited:
     place: str
     seconds: float
     timer: str
+    completion: str
     token: int
     completed: int
     over: int
@@ -50,7 +51,8 @@ def limited(subnet: Net) -> tuple[Limited, ...]:
     def of(place: Place) -> Iterator[Limited]:
         if (within := place.within) is not None:
             token, done, over = 1 << subnet.place_index[place.name], bit(place.completion), bit(within.timer)
-            yield Limited(place.name, within.milliseconds / 1000, within.timer, token, done, over)
+            completion = place.completion or ""
+            yield Limited(place.name, within.milliseconds / 1000, within.timer, completion, token, done, over)
 
     return tuple(each for place in subnet.places for each in of(place))
 
@@ -83,7 +85,8 @@ class Timekeeper:
                 self.told.pop(each.place, None)
             if enters and self.word & each.over:
                 raise TimeLimitError(f"'{each.place}' is entered, and '{each.timer}' is set")
-            if not machine.held and (enters or (resumed and self._waits(each))):
+            was_sent = machine.commands.entry(each.completion) > 0
+            if not machine.held and (enters or (resumed and was_sent and self._waits(each))):
                 self.entered[each.place] = now_seconds
             if each.place in held and each.place in self.entered:
                 self.entered[each.place] = now_seconds

@@ -194,6 +194,18 @@ def test_after_a_restart_a_command_that_was_done_meanwhile_is_not_timed() -> Non
     assert again.deadline() is None
 
 
+def test_a_token_of_the_start_has_no_time_after_a_restart_either() -> None:
+    decomposition = split(parse_net(HANDOVER.replace("start: free", "start: go")))
+    first = LocalController(decomposition, "a")
+    kept = kept_of(first.start())
+    assert first.deadline() is None
+    again = LocalController.restored(decomposition, "a", kept)
+    again.start()
+    assert again.resume() == []
+    assert again.deadline() is None
+    assert again.tick(0.0) == again.tick(100.0) == []
+
+
 def test_a_controller_that_is_held_times_no_command_that_it_owes() -> None:
     decomposition = split(parse_net(HANDOVER.replace("to: a.go}\n  hand", "to: a.go, if: b.idle}\n  hand")))
     first = LocalController(decomposition, "a")
