@@ -122,6 +122,8 @@ class BoundDriver:
         self.has_begun = True
         tasks = [asyncio.create_task(device.run(), name=name) for name, device in self.devices.items()]
         try:
+            if not tasks:  # a host without machines, which may be given the binding of its cell all the same
+                await asyncio.get_running_loop().create_future()
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_EXCEPTION)
             for task in done:
                 task.result()

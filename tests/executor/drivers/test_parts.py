@@ -11,14 +11,16 @@ from firable.cli.main import EXTRAS
 from firable.executor.cell.plant import Plant
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.bench import Heard
-from firable.executor.drivers.binding import ChannelDocument, SignalDocument, parse_binding
-from firable.executor.drivers.bound import BoundDriver
+from firable.executor.drivers.binding import ChannelDocument, SignalDocument, parse_binding, read_binding
+from firable.executor.drivers.bound import BoundDriver, bound_driver
 from firable.executor.drivers.channels import NUMBER_MAX, Channel, Order, Outcome, Said
 from firable.executor.drivers.completions import Completions
 from firable.executor.drivers.device import Value, Writes
 from firable.executor.drivers.driver import Answer, Quality
 from firable.executor.drivers.image import Image
 from firable.executor.drivers.simulated import SimulatedDriver
+from firable.executor.operating.hosting import own_net
+from firable.nets.catalogue import catalogue_path
 
 
 def image(**options: object) -> Image:
@@ -332,3 +334,20 @@ def test_missing_library_ends_the_run_and_is_told_by_the_extra_that_brings_it(
         asyncio.run(BoundDriver(binding, (), frozenset()).run(heard, heard))
     assert missing.value.name is not None
     assert missing.value.name.partition(".")[0] in EXTRAS
+
+
+def test_a_host_without_machines_runs_with_the_binding_of_its_cell() -> None:
+    async def main() -> None:
+        heard, decomposition = Heard(), decomposition_of("one_robot")
+        binding = read_binding(catalogue_path("one_robot").with_name("one_robot.bind.yaml"))
+        driver = bound_driver(binding, decomposition.net, own_net(decomposition, ("system",)))
+        assert not driver.devices
+        running = asyncio.create_task(driver.run(heard, heard))
+        await asyncio.sleep(10)
+        assert not running.done()
+        running.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await running
+        assert driver.unconfirmed == ()
+
+    run_in_virtual_time(main())
