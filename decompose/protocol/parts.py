@@ -93,11 +93,11 @@ class Parts:
 
     @cached_property
     def groups(self) -> tuple[tuple[str, ...], ...]:
-        """The coordinated transitions that are decided together, each in one group."""
+        """The coordinated transitions that are decided together, each once, however many turns it has."""
         if not self.variant.arbitrated:
             return tuple((t,) for t in self.coordinated)
         together = [
-            tuple(t for t in (*group.sequence, *group.rest) if t in self.coordinated)
+            tuple(dict.fromkeys(t for t in (*group.sequence, *group.rest) if t in self.coordinated))
             for group in self.decomposition.groups
             if group.controller is None
         ]

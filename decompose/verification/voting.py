@@ -181,9 +181,9 @@ class Voting:
 
     @cached_property
     def groups(self) -> tuple[tuple[str, ...], ...]:
-        """What is decided together: one commit in each round."""
-        decided_by_root = (group for group in self.cut.groups if group.controller is None)
-        together = [tuple(t for t in (*g.sequence, *g.rest) if t in self.parts) for g in decided_by_root]
+        """What is decided together: one commit in each round, whoever has several turns."""
+        central = (group for group in self.cut.groups if group.controller is None)
+        together = [tuple(dict.fromkeys(t for t in (*g.sequence, *g.rest) if t in self.parts)) for g in central]
         grouped = {t for group in together for t in group}
         return (*(group for group in together if group), *((t,) for t in self.parts if t not in grouped))
 

@@ -34,6 +34,7 @@ from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net, family_net
 from firable.nets.diagnostics import InputError
 from firable.nets.net import Controller, Net, Place, Transition
+from firable.nets.text import parse_net
 from firable.nets.verdict import Status, Verdict
 
 FAULTS = pytest.mark.parametrize("faults", [NO_FAULTS, ANY_FAULTS], ids=["explored", "faults"])
@@ -109,6 +110,28 @@ def test_protocols_with_free_parts_are_proved_and_stated_anew(net: Net, faults: 
     proof = prove_inductively(protocol_net(decomposition, PROTOCOL, faults), TIMEOUT_MS)
     assert not proof.open_
     assert proof.text == StatedAnew(Voting(Cut(net), bool(faults), frozenset(decomposition.free))).text
+
+
+TWICE = """\
+firable: 1
+cell: twice
+controllers:
+  a: {start: p, places: {p: , q: }}
+  b: {start: p, places: {p: , q: }}
+  c: {start: p, places: {p: , q: }}
+transitions:
+  t: {from: [a.p, b.p], to: [a.q, b.q]}
+  u: {from: [a.p, c.p], to: [a.q, c.q]}
+  t-back: {from: [a.q, b.q], to: [a.p, b.p]}
+  u-back: {from: [a.q, c.q], to: [a.p, c.p]}
+arbiters:
+  next: {among: [t, u, t], by: order}
+"""
+
+
+def test_who_has_two_turns_of_an_order_takes_part_once() -> None:
+    bundle = make_bundle(check(parse_net(TWICE)), protocol=True, faults=True)
+    assert all(one.shown for one in check_bundle(bundle))
 
 
 def test_that_votes_stand_is_given_and_needed(monkeypatch: pytest.MonkeyPatch) -> None:
