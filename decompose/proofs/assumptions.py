@@ -1,7 +1,7 @@
 """What a proof of the decomposition assumes of the cell: external gates that nobody can lock (O4).
 
 What the coordinator decides is decided from votes taken at different instants, and fires later still. A promise holds
-the places of a part as they are, and the completion signals too: only sending their command clears them, and a
+the places of a part as they are, and completion signals and timers too: only sending their command clears them, and a
 controller that has promised sends none of these. A sensor it cannot hold. Eq. (8) of the whole then says "each gate was
 true at its own vote", which is Eq. (8) of one instant only if the gate stays open until the transition fires. So for
 each sensor, and for each gate that wants a signal to be 0, which a machine may end at any time, the assumption is

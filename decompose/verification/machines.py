@@ -170,9 +170,11 @@ def _asked(cut: Cut, loop: ClosedLoop) -> Iterator[Question]:
     completions = dict[str, Property]()
     for row in cut.coordinated:
         for gate in cut.net.transition(row.name).external:
+            kind = cut.net.signal(gate.signal).kind
+            if gate.wanted and kind is SignalKind.TIMER:
+                continue  # the promise keeps it: like a completion, only a command clears it
             question = _closes_after_vote(cut, loop, row.name, gate)
-            completion = cut.net.signal(gate.signal).kind is SignalKind.COMPLETION
-            if gate.wanted and completion:
+            if gate.wanted and kind is SignalKind.COMPLETION:
                 completions[f"{gate.signal} for {row.name}"] = _never(f"o4.completion.{len(completions)}", question)
                 continue
             name = f"o4.{row.name}/{gate.signal}"

@@ -133,6 +133,41 @@ def test_a_bundle_with_its_machines_is_shown() -> None:
     assert all("closed anew with plant.yaml" in checked[name].method for name in names)
 
 
+WARNED = """\
+firable: 1
+cell: warned
+controllers:
+  a:
+    start: free
+    places:
+      free:
+      go:       {send: {machine: A, command: GO}, until: there, within: 1s}
+      go_fault: {send: {machine: A, command: STOP}}
+  b: {start: calm, places: {calm: , alarm: }}
+transitions:
+  start: {from: a.free, to: a.go}
+  end: {from: a.go, to: a.free}
+  again: {from: a.go_fault, to: a.free}
+  warn: {from: b.calm, to: b.alarm, if: a.go_overdue}
+  quit: {from: b.alarm, to: b.calm}
+"""
+ITS_MACHINE = """\
+firable_plant: 1
+plant: warned
+stations: [entry]
+arrivals:   {station: entry, every_s: 1}
+departures: {station: entry}
+machines:
+  A: {commands: {GO: {does: work, takes_s: 1}, STOP: {does: stop}}}
+"""
+
+
+def test_nothing_is_asked_of_a_timer_that_a_promise_keeps() -> None:
+    bundle = make_bundle(check(parse_net(WARNED)), plant=ITS_MACHINE)
+    assert [v.name for v in bundle.verdicts if v.name.startswith("o4.")] == ["o4.completions", "o4.commands"]
+    assert all(one.shown for one in check_bundle(bundle))
+
+
 @pytest.mark.seeds
 @pytest.mark.usefixtures("remembering", "unchanged")
 def test_every_single_change_of_a_verdict_on_the_machines_is_refused() -> None:
