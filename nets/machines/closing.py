@@ -241,14 +241,16 @@ class _Closing:
             (*((name, False) for name in transition.inputs), *((name, True) for name in transition.outputs)),
         )
         moments, ended = each(each([NOTHING], [own]), [self.applied(transition)]), list[Moment]()
+        commanded = set[str]()
         # In the order of the net, as the executor sends what one firing commands.
         for name in sorted(transition.outputs, key=self.net.place_index.__getitem__):
             place = self.net.place(name)
             if place.command is None or name in self.unsent:
                 continue
             moments = each(each(moments, self.cleared(place)), self.timed_anew(place))
-            ended += each(moments, self.laws.refused(place))
+            ended += each(moments, self.laws.refused(place, again=place.command.machine in commanded))
             moments = each(moments, self.laws.sent(place))
+            commanded.add(place.command.machine)
             if len(moments) + len(ended) > VARIANTS_MAX:
                 raise _too_many(transition)
         for moment in chain.from_iterable(map(self.seen, moments)):

@@ -244,14 +244,18 @@ class Laws:
         for place in self.may_break_off[name]:
             yield self.no_longer_broken_off(place).with_(self._undone(place)).with_(Case(tag=f"undone-{place.name}"))
 
-    def refused(self, place: Place) -> Iterator[Case]:
-        """The accidents that sending the command of a place can be: each wants that none before it happens."""
+    def refused(self, place: Place, *, again: bool = False) -> Iterator[Case]:
+        """The accidents that sending the command of a place can be: each wants that none before it happens.
+
+        `again` says that the same firing has sent the machine a command before.
+        """
         name, action = self.machine(place)[0], self.action(place)
         if isinstance(action, Stop):
             return
         idle: Literal = (self.idle(name), True)
         told = f"{name} is given {_words(place)}"
-        yield self._accident(((idle[0], False),), f"{name}-busy", f"{told} while it is at another command", OVERRUN)
+        busy = f"{name}-busy-{place.name}" if again else f"{name}-busy"  # the one before can be refused, too
+        yield self._accident(((idle[0], False),), busy, f"{told} while it is at another command", OVERRUN)
         match action:
             case Grasp() | Put():
                 at: Literal = (self._hand(place), True)

@@ -187,6 +187,42 @@ def test_a_firing_that_stops_two_machines_is_compared_however_many_commands_they
     assert compare_one(plant, "stop", stopping) < 4 * len(stopping)
 
 
+AT_ONCE_TWICE = """
+firable: 1
+cell: both
+controllers:
+  c:
+    start: free
+    places:
+      free:
+      opens: {send: {machine: D, command: OPEN}}
+      shuts: {send: {machine: D, command: SHUT}}
+transitions:
+  both: {from: c.free, to: [c.opens, c.shuts]}
+  again: {from: [c.opens, c.shuts], to: c.free}
+"""
+DOOR = """
+firable_plant: 1
+plant: both
+stations: [s]
+arrivals:   {station: s, every_s: 5}
+departures: {station: s, after_s: 1}
+machines:
+  D: {commands: {OPEN: {does: work, takes_s: 1}, SHUT: {does: work, takes_s: 1}}}
+"""
+
+
+def test_of_two_commands_that_one_firing_sends_to_one_machine_either_may_be_refused() -> None:
+    net, model = parse_net(AT_ONCE_TWICE), parse_plant(DOOR)
+    loop, plant = close(net, model), Plant(net, model, Sending.AT_ONCE)
+    both = by_happening(plant, loop.net.transitions)["both"]
+    assert {loop.accidents[t.name] for t in both} == {
+        "D is given OPEN while it is at another command",
+        "D is given SHUT while it is at another command",
+    }
+    assert compare(plant, loop) > 0
+
+
 def test_a_gate_on_what_the_reading_does_not_look_at_is_refused() -> None:
     net, model, loop = closed("one_robot")
     plant, seen = Plant(net, model), 0
