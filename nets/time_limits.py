@@ -26,6 +26,7 @@ whose verdicts hold only as long as every machine keeps its times.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 from typing import Final
 
@@ -102,6 +103,7 @@ def fault_place(place: Place) -> Place:
 def limit_problems(net: Net) -> Iterator[Diagnostic]:
     """Every rule on time limits that a net violates; `ValueError` for what no text can say."""
     signals = {signal.name: signal for signal in net.signals}
+    named = Counter(signal.name for signal in net.signals)  # of two that bear one name that alone is told
     timers: dict[str, str] = {}
     for place in net.places:
         if place.within is None:
@@ -119,7 +121,7 @@ def limit_problems(net: Net) -> Iterator[Diagnostic]:
         signal = signals.get(place.within.timer)
         if signal is None or signal.kind is not SignalKind.TIMER:
             raise ValueError(f"'{place.within.timer}', which is to time '{place.name}', is no timer of the net")
-        if (other := timers.setdefault(signal.name, place.name)) != place.name:
+        if (other := timers.setdefault(signal.name, place.name)) != place.name and named[signal.name] == 1:
             raise ValueError(f"'{signal.name}' times both '{other}' and '{place.name}'")
     for signal in net.signals:
         if signal.kind is SignalKind.TIMER and signal.name not in timers:

@@ -113,6 +113,11 @@ def test_a_name_that_a_time_limit_gives_is_taken_where_the_limit_stands() -> Non
     assert refused(CELL.replace("  end:", "  robot.go_timeout:")) == [("F2001", "5s")]
 
 
+def test_one_timer_of_two_places_is_refused_where_the_second_names_it() -> None:
+    more = "      more: {send: {machine: R, command: MORE}, until: done, within: {time: 1s, timer: go_overdue}}\n"
+    assert refused(CELL.replace("transitions:\n", f"{more}transitions:\n")) == [("F2001", "go_overdue")]
+
+
 def test_a_program_cannot_make_a_place_with_half_a_time_limit() -> None:
     net = parse_net(CELL)
     go, others = net.place("robot.go"), [place for place in net.places if place.name != "robot.go"]
