@@ -469,7 +469,7 @@ def _assert_projects(net: Net, transition: Transition, variants: Iterable[Transi
     for variant in variants:
         same = {name for name in variant.inputs if name in net.place_index} == want
         same &= {name for name in variant.outputs if name in net.place_index} == put
-        same &= set(transition.permissive) <= {*variant.permissive}
+        same &= set(transition.permissive) <= {*variant.permissive, *variant.inputs}
         same &= set(transition.inhibitive) <= {*variant.inhibitive, *variant.outputs}
         if not same:
             raise RuntimeError(f"the variant '{variant.name}' does not do what '{transition.name}' does")

@@ -249,6 +249,16 @@ def test_a_controller_with_the_name_of_the_plant_is_told_that_the_machines_have_
     assert "'plant' would name two controllers of the cell with its machines" in problem.message
 
 
+def test_gates_on_the_own_input_and_output_ask_for_what_firing_asks_for_already() -> None:
+    text = "firable: 1\ncell: x\ncontrollers: {{c: {{start: a, places: {{a: , b: }}}}}}\ntransitions:\n  t: {}\n"
+    plant = parse_plant(PLANT_OF_NOTHING[: PLANT_OF_NOTHING.index("sensors:")])
+    bare, gated = (
+        close(parse_net(text.format(t)), plant).net
+        for t in ("{from: c.a, to: c.b}", "{from: c.a, to: c.b, if: c.a, unless: c.b}")
+    )
+    assert gated.transitions == bare.transitions
+
+
 def test_who_has_a_key_that_stands_alone_is_asked_what_it_means() -> None:
     commands = "{GO: {does: work, takes_s: 1, may_fail: }}"
     plant = PLANT_OF_NOTHING.replace("{}", f"{{M: {{hand: , commands: {commands}}}}}").replace(
