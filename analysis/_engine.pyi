@@ -423,17 +423,21 @@ def explore_symbolically(
     *,
     max_memory_bytes: int,
     max_seconds: float | None = None,
+    threads: int = 1,
+    second_free: Callable[[], bool] | None = None,
     cancelled: Callable[[], bool] | None = None,
     orders: list[list[int]] | None = None,
 ) -> Diagram:
     """Find the markings reachable under interleaving as a zero-suppressed decision diagram, by saturation.
 
     The arguments are those of `explore`. Several orders of the places race each other, `orders` in the place of the
-    engine's own candidates, each a permutation of the places from the lowest level to the highest. What ends the
-    search ends later work in the diagram too, until `Diagram.limit` says otherwise.
+    engine's own candidates, each a permutation of the places from the lowest level to the highest. Of 2 `threads` the
+    second shares the longer rounds of the race, of those that begin while `second_free`, where that is given, last said
+    so; who wins is the same, if memory suffices. What ends the search ends later work in the diagram too, until
+    `Diagram.limit` says otherwise.
 
     Raises `BudgetExceeded` where memory or time ends before all markings are found, `ValueError` for a place out of
-    range or what is no order.
+    range, what is no order, or more threads.
 
     >>> diagram = explore_symbolically(2, [([0], [1], [], [], [])], [0], max_memory_bytes=1_000_000)
     >>> diagram.reach().count(), diagram.reach().edges()

@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from threading import Event
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 from firable.analysis._engine import BudgetExceeded
 from firable.analysis.deadline import Deadline
@@ -74,6 +74,8 @@ _FIRST_LANES: Final = ((Method.REDUCTION, Method.WALK, Method.STATE_EQUATION), (
 _FIRST_SLICES_SECONDS: Final = (3.0, 10.0)
 _FORMULAS_SHARE: Final = 0.25  # of the time that is left, for formulas without sets of markings
 _FORMULA_SLICES_SECONDS: Final = (1.0, 5.0)
+
+_Contestant: TypeAlias = Contestant[StateSpace[Any]]
 
 
 def check(
@@ -162,7 +164,7 @@ class _Check:
         course = ["the explicit engine has no room for the net itself"]
         for of in SPACES.values():
             try:
-                space = of.load()(self.net, Limits(self.deadline, self.budget.memory_bytes))
+                space = of.load()(self.net, Limits(self.deadline, self.budget.memory_bytes, threads=2))
             except BudgetExceeded:
                 continue
             return _told(self._report(space), [*course, f"{of.words}: {_size(space)}"])
@@ -198,7 +200,7 @@ class _Check:
         if method in SPACES:
             words = SPACES[method].words
             try:
-                space = SPACES[method].load()(self.net, Limits(self.deadline, self.budget.memory_bytes))
+                space = SPACES[method].load()(self.net, Limits(self.deadline, self.budget.memory_bytes, threads=2))
             except BudgetExceeded as error:
                 return _told(self._report(self._nothing()), [f"{words} gave up: {error}"])
             return _told(self._report(space), [f"{words}: {_size(space)}"])
@@ -253,18 +255,11 @@ class _Check:
         """
         limits = Limits(_share(self.deadline, _SPACES_SHARE), self.budget.memory_bytes)
         enough, space = Event(), None
-        others = [Event() for _ in SPACES]
         with ThreadPoolExecutor(1) as beside:
             begun = beside.submit(self._begin, settling, replace(limits.deadline, cancelled=enough))
-
-            def is_alone() -> bool:
-                return begun.done() and all(ended.is_set() for ended in others)
-
-            contestants = [Contestant("explicit engine", partial(self._held_explicitly, is_alone, ends))]
-            contestants += [
-                Contestant(of.words, partial(_held, of, self.net, ended))
-                for of, ended in zip(SPACES.values(), others, strict=True)
-            ]
+            contestants = [Contestant("explicit engine", partial(self._held_explicitly, ends))]
+            contestants += [Contestant(of.words, partial(_held, of, self.net)) for of in SPACES.values()]
+            contestants = _by_two_when_alone(contestants, begun.done)
             try:
                 outcome = race([[one] for one in contestants], limits, slices_seconds=None)
                 course += outcome.told
@@ -283,8 +278,8 @@ class _Check:
         begun.result()
         return space
 
-    def _held_explicitly(self, is_alone: Callable[[], bool], ends: list[str | None], limits: Limits) -> StateSpace[Any]:
-        """The graph, by a second thread too once nothing else wants a processor."""
+    def _held_explicitly(self, ends: list[str | None], limits: Limits) -> StateSpace[Any]:
+        """The graph; `ends` is told why the engine ended."""
         budget = replace(self.budget, memory_bytes=limits.memory_bytes, seconds=None)
         try:
             graph = explore(
@@ -293,8 +288,8 @@ class _Check:
                 budget,
                 deadline=limits.deadline,
                 progress=self.progress,
-                threads=2,
-                second_free=is_alone,
+                threads=limits.threads,
+                second_free=limits.second_free,
             )
         except InputError as error:  # a part of the memory does not hold the net itself, and others may need less
             raise BudgetExceeded(error.diagnostics[0].message) from None
@@ -351,15 +346,26 @@ def _asked_of(question: Question) -> Verdict:
     return question.settle(unknown("not asked yet", ""), "", Discipline.INTERLEAVING, Cost())
 
 
-def _held(
-    of: Technique[Callable[[Net, Limits], StateSpace[Any]]], net: Net, ended: Event, limits: Limits
-) -> StateSpace[Any]:
-    try:
-        space = of.load()(net, limits)
-        space.require_complete()
-        return space
-    finally:
-        ended.set()
+def _held(of: Technique[Callable[[Net, Limits], StateSpace[Any]]], net: Net, limits: Limits) -> StateSpace[Any]:
+    space = of.load()(net, limits)
+    space.require_complete()
+    return space
+
+
+def _by_two_when_alone(contestants: Sequence[_Contestant], is_idle: Callable[[], bool]) -> list[_Contestant]:
+    """The same, who each work by a second thread too once all others have ended and whatever else runs is idle."""
+    ended = [Event() for _ in contestants]
+
+    def run(own: int, limits: Limits) -> StateSpace[Any] | None:
+        def is_alone() -> bool:
+            return is_idle() and all(each.is_set() for at, each in enumerate(ended) if at != own)
+
+        try:
+            return contestants[own].run(replace(limits, threads=2, second_free=is_alone))
+        finally:
+            ended[own].set()
+
+    return [replace(contestant, run=partial(run, at)) for at, contestant in enumerate(contestants)]
 
 
 def _moment(deadline: Deadline, share: float, of: Method | None = None) -> Deadline:

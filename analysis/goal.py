@@ -35,12 +35,15 @@ def _nobody(_words: str) -> None:
 class Limits:
     """What a technique may take: until when (or until it is cancelled), how many bytes, and how long runs it unrolls.
 
-    `tell` is told in words how far it is.
+    Of two `threads` the second works while `second_free` says that a processor is free for it, if that is given. `tell`
+    is told in words how far it is.
     """
 
     deadline: Deadline = field(default_factory=Deadline)
     memory_bytes: int = 2 * 2**30
     depth_max: int = DEPTH_MAX
+    threads: int = 1
+    second_free: Callable[[], bool] | None = field(default=None, compare=False)
     tell: Callable[[str], object] = field(default=_nobody, compare=False)
 
 

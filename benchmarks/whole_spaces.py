@@ -85,7 +85,7 @@ def _table(words: str, make: Callable[[Net, Limits], StateSpace[Any]], repeat: i
         seconds: list[float] = []
         told = ""
         for _ in range(repeat):
-            limits = Limits(Deadline.after(SECONDS_MAX), MEMORY_BYTES_MAX)
+            limits = Limits(Deadline.after(SECONDS_MAX), MEMORY_BYTES_MAX, threads=2)
             try:
                 space, took = timed(partial(make, net, limits))
             except BudgetExceeded as error:

@@ -340,8 +340,8 @@ def explore_symbolically(
     """All reachable markings of a net under interleaving, external gates free.
 
     Who knows good orders of the places gives the indexes of the places for each, from the lowest level of the diagram
-    to the highest; else the engine makes some. Where there are several, they race each other. Raises `BudgetExceeded`
-    where the limits of memory or time end the search before it has found all.
+    to the highest; else the engine makes some. Where there are several, they race each other, by two threads where the
+    limits allow two. Raises `BudgetExceeded` where the limits of memory or time end the search before it has found all.
 
     >>> from firable.nets.catalogue.families import family_net
     >>> space = explore_symbolically(family_net("philosophers_either-100"))
@@ -352,6 +352,8 @@ def explore_symbolically(
     diagram = _engine.explore_symbolically(
         *flat(net),
         max_memory_bytes=limits.memory_bytes,
+        threads=limits.threads,
+        second_free=limits.second_free,
         orders=None if orders is None else [list(order) for order in orders],
         **engine_limits(limits.deadline),
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+from threading import Event
 from typing import Any
 
 import pytest
@@ -9,7 +11,9 @@ import pytest
 from firable.analysis import check as module
 from firable.analysis._engine import IncompleteGraph
 from firable.analysis.check import check
+from firable.analysis.goal import Limits
 from firable.analysis.methods import GOALS, KNOWERS, SPACES, Method
+from firable.analysis.race import Contestant
 from firable.analysis.report import CheckReport, report_on
 from firable.analysis.spaces.reachability import Budget
 from firable.nets.catalogue import catalogue_net
@@ -111,6 +115,23 @@ def test_what_no_space_holds_follows_from_a_deadlock_that_was_found(monkeypatch:
 
 def _gives_up(*_: object) -> None:
     raise IncompleteGraph("no room")
+
+
+def test_who_is_left_alone_works_by_two_threads() -> None:
+    told: list[tuple[str, int, bool]] = []
+
+    def runs(name: str, limits: Limits) -> None:
+        assert limits.second_free is not None
+        told.append((name, limits.threads, limits.second_free()))
+
+    idle = Event()
+    contestants: list[Contestant[Any]] = [Contestant(name, partial(runs, name)) for name in "ab"]
+    one, other = module._by_two_when_alone(contestants, idle.is_set)
+    other.run(Limits())
+    one.run(Limits())  # the other one has ended, but something else works
+    idle.set()
+    one.run(Limits())
+    assert told == [("b", 2, False), ("a", 2, False), ("a", 2, True)]
 
 
 def test_two_queries_of_one_name_are_refused() -> None:

@@ -116,3 +116,27 @@ def test_steps_and_more_threads_are_refused() -> None:
 def test_synchronous_steps_are_explored_by_one_thread_whatever_is_asked() -> None:
     net = family_net("machines-3")
     assert explore_net(net, "step", threads=2).n_markings == explore_net(net, "step").n_markings
+
+
+def searched(name: str, **limits: Any) -> _engine.Diagram:
+    """All markings of a net of a family as a diagram."""
+    n_places, transitions, initial = rows(family_net(name))
+    return _engine.explore_symbolically(n_places, transitions, initial, max_memory_bytes=1 << 30, **limits)
+
+
+def test_by_two_threads_the_same_order_wins_the_race_as_by_one() -> None:
+    one, two = (searched("vehicles-6-24", threads=n) for n in (1, 2))
+    assert (one.order, one.n_nodes, one.reach().count()) == (two.order, two.n_nodes, two.reach().count())
+
+
+def test_what_asking_for_the_second_processor_of_a_race_raises_comes_out() -> None:
+    def broken() -> bool:
+        raise LookupError("nobody knows")
+
+    with pytest.raises(LookupError, match="nobody knows"):
+        searched("vehicles-8-32", threads=2, second_free=broken)
+
+
+def test_more_threads_than_two_are_refused() -> None:
+    with pytest.raises(ValueError, match="1 or 2 threads search, not 3"):
+        searched("vehicles-2-8", threads=3)

@@ -5,7 +5,7 @@
 //! here first, and asks the allocator by `try_reserve`. A budget counted from outside (resident memory) was rejected:
 //! it sees the shortage only when it has happened.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 /// Why an exploration or an analysis ended early.
@@ -139,7 +139,7 @@ impl Memory {
 }
 
 /// Units of work between two looks at the clock.
-const CLOCK_EVERY: usize = 1 << 12;
+pub(crate) const CLOCK_EVERY: usize = 1 << 12;
 /// Units of work before the first call of `poll`.
 const FIRST_POLL: usize = 1 << 16;
 /// Time between two calls of `poll`. By the clock and not by work: a caller may have to wait for its turn (the
@@ -168,6 +168,8 @@ pub struct Watch<'a> {
     /// Work left before the first call of `poll`, which soon follows the start.
     before_first: Option<usize>,
     polled: Instant,
+    poll_every: Duration,
+    second: Option<&'a AtomicBool>,
     /// What was found so far; the work that knows it keeps it up to date.
     pub found: Found,
 }
@@ -175,8 +177,31 @@ pub struct Watch<'a> {
 impl<'a> Watch<'a> {
     /// `poll` is called after 2^16 units of work and then some twenty times a second; it says whether to stop and why.
     pub fn new(deadline: Option<Instant>, poll: &'a mut dyn FnMut(Found) -> Result<(), Stop>) -> Self {
-        let found = Found::default();
-        Watch { deadline, poll, since_clock: 0, before_first: Some(FIRST_POLL), polled: Instant::now(), found }
+        Watch {
+            deadline,
+            poll,
+            since_clock: 0,
+            before_first: Some(FIRST_POLL),
+            polled: Instant::now(),
+            poll_every: POLL_EVERY,
+            second: None,
+            found: Found::default(),
+        }
+    }
+
+    /// The same with a `poll` that costs nothing and is called at each look at the clock.
+    pub(crate) fn often(deadline: Option<Instant>, poll: &'a mut dyn FnMut(Found) -> Result<(), Stop>) -> Self {
+        Watch { before_first: None, poll_every: Duration::ZERO, ..Watch::new(deadline, poll) }
+    }
+
+    /// The same for work that a second thread may share while this says that a processor is free for it.
+    pub fn with_second(self, free: Option<&'a AtomicBool>) -> Self {
+        Watch { second: free, ..self }
+    }
+
+    /// Whether a second thread may share the work now.
+    pub(crate) fn second_is_free(&self) -> bool {
+        self.second.is_some_and(|free| free.load(Ordering::Relaxed))
     }
 
     /// When time is over.
@@ -198,7 +223,7 @@ impl<'a> Watch<'a> {
             return Err(Stop::Time);
         }
         self.before_first = self.before_first.map(|left| left.saturating_sub(self.since_clock));
-        let due = self.before_first == Some(0) || now.duration_since(self.polled) >= POLL_EVERY;
+        let due = self.before_first == Some(0) || now.duration_since(self.polled) >= self.poll_every;
         self.since_clock = 0;
         if due {
             self.before_first = None;

@@ -6,6 +6,7 @@
 //! writes itself off in a list of its own.
 
 use std::collections::HashMap;
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
@@ -15,7 +16,7 @@ use pyo3::pyclass::CompareOp;
 use pyo3::types::{PyBytes, PyInt};
 
 use super::rows::Rows;
-use super::{Patience, answered};
+use super::{Patience, answered, answered_by};
 use crate::budget::{Stop, Watch};
 use crate::net::Transition;
 use crate::symbolic::algebra::Binary;
@@ -336,7 +337,8 @@ impl Diagram {
 
 /// Finds the reachable markings of a net as a decision diagram.
 #[pyfunction]
-#[pyo3(signature = (n_places, transitions, initial, *, max_memory_bytes, max_seconds=None, cancelled=None, orders=None))]
+#[pyo3(signature = (n_places, transitions, initial, *, max_memory_bytes, max_seconds=None, threads=1, second_free=None,
+                    cancelled=None, orders=None))]
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn explore_symbolically(
     py: Python<'_>,
@@ -345,11 +347,18 @@ pub(crate) fn explore_symbolically(
     initial: Vec<u32>,
     max_memory_bytes: usize,
     max_seconds: Option<f64>,
+    threads: usize,
+    second_free: Option<Py<PyAny>>,
     cancelled: Option<Py<PyAny>>,
     orders: Option<Vec<Vec<u32>>>,
 ) -> PyResult<Diagram> {
     let begun = Instant::now();
-    let patience = Patience::new(max_seconds, cancelled)?;
+    if !(1..=2).contains(&threads) {
+        return Err(PyValueError::new_err(format!("1 or 2 threads search, not {threads}")));
+    }
+    // Until somebody has said so, it is not.
+    let free = Arc::new(AtomicBool::new(second_free.is_none()));
+    let patience = Patience::new(max_seconds, cancelled)?.noting(second_free, &free);
     for order in orders.iter().flatten() {
         let mut sorted = order.clone();
         sorted.sort_unstable();
@@ -367,14 +376,15 @@ pub(crate) fn explore_symbolically(
         return Err(PyValueError::new_err(format!("place {place} is not one of the {n_places} places")));
     }
     let n_transitions = transitions.len();
-    let space = answered(py, &patience, |watch| {
+    let second = (threads == 2).then_some(&*free);
+    let space = answered_by(py, &patience, second, |watch| {
         Symbolic::explore(n_places, transitions, initial, max_memory_bytes, orders, watch)
     })?;
     let n_nodes = space.nodes;
     let shared = Arc::new(Shared {
         space: Mutex::new(space),
         named: Mutex::default(),
-        patience: Mutex::new(Arc::new(patience)),
+        patience: Mutex::new(Arc::new(patience.noting(None, &free))),
     });
     let seconds = begun.elapsed().as_secs_f64();
     Ok(Diagram { shared, places: n_places, transitions: n_transitions, seconds, n_nodes })

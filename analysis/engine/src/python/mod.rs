@@ -117,8 +117,19 @@ pub(crate) fn answered<T: Send>(
     patience: &Patience,
     work: impl FnOnce(&mut Watch<'_>) -> Result<T, Stop> + Send,
 ) -> PyResult<T> {
+    answered_by(py, patience, None, work)
+}
+
+/// The same for work that a second thread may share while a processor is free for it.
+pub(crate) fn answered_by<T: Send>(
+    py: Python<'_>,
+    patience: &Patience,
+    second: Option<&AtomicBool>,
+    work: impl FnOnce(&mut Watch<'_>) -> Result<T, Stop> + Send,
+) -> PyResult<T> {
     let mut raised = None;
-    let result = detached(py, patience, &mut raised, |poll| work(&mut Watch::new(patience.deadline, poll)));
+    let result =
+        detached(py, patience, &mut raised, |poll| work(&mut Watch::new(patience.deadline, poll).with_second(second)));
     result.map_err(|stop| match (stop, raised) {
         (_, Some(error)) => error,
         (stop, None) => BudgetExceeded::new_err(match stop {

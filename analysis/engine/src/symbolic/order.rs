@@ -23,6 +23,9 @@
 //! belongs together, even where its arcs are three times as long as the best. Every order has two directions, which
 //! cost the same by any measure of spans and differ by orders of magnitude in the search; so both are given, and raced.
 
+use std::panic::resume_unwind;
+use std::thread;
+
 use crate::budget::{Stop, Watch};
 use crate::net::Transition;
 
@@ -194,6 +197,17 @@ impl Graph {
     }
 }
 
+/// What two pieces of work come to, one of them by a second thread where that is free and the system has it to give.
+fn of_both<A, B: Send>(second: bool, one: impl FnOnce() -> A, other: impl Fn() -> B + Sync) -> (A, B) {
+    let other = &other;
+    thread::scope(|scope| {
+        let beside = if second { thread::Builder::new().spawn_scoped(scope, other).ok() } else { None };
+        let one = one();
+        let joined = beside.map(|beside| beside.join().unwrap_or_else(|panic| resume_unwind(panic)));
+        (one, joined.unwrap_or_else(other))
+    })
+}
+
 /// Orders worth trying, those with the shorter arcs first, each followed by its reverse.
 ///
 /// The watch is asked between two of them, each of which has work of its own that is bounded.
@@ -202,22 +216,20 @@ pub fn candidates(places: usize, transitions: &[Transition], watch: &mut Watch<'
     let as_given: Order = (0..places as u32).collect();
     let both = |order: Order| [order.clone(), order.into_iter().rev().collect::<Order>()];
     let span = |pair: &[Order; 2]| graph.span(&pair[0]);
-    let given = [graph.slide(as_given.clone()), as_given].map(both);
-    let mut found = Vec::new();
-    for numbered in [Graph::sloan, Graph::cuthill_mckee] {
-        let mut order = numbered(&graph);
-        for shortened in [Graph::force, Graph::slide] {
-            watch.tick(BETWEEN)?;
-            order = shortened(&graph, order);
-        }
-        found.push(both(order));
-    }
+    let shortened = |order: Order| both(graph.slide(graph.force(order)));
     watch.tick(BETWEEN)?;
+    let ((sloan, given), (cuthill_mckee, hubs)) = of_both(
+        watch.second_is_free(),
+        || (shortened(graph.sloan()), [graph.slide(as_given.clone()), as_given].map(both)),
+        || (shortened(graph.cuthill_mckee()), graph.by_hub(transitions)),
+    );
+    watch.tick(BETWEEN)?;
+    let mut found = vec![sloan, cuthill_mckee];
     let best = found.iter().min_by_key(|pair| span(pair)).map(|pair| &pair[0]);
     let spectral = best.map(|best| graph.spectral(best, watch)).transpose()?.flatten();
     let spectral = spectral.map(|order| both(graph.slide(order)));
     watch.tick(BETWEEN)?;
-    if let Some(hubs) = graph.by_hub(transitions) {
+    if let Some(hubs) = hubs {
         // Where the hubs give the shorter arcs, what was found is as good but for disorder within the hubs.
         if found.iter().all(|pair| span(&hubs) < span(pair)) {
             found.clear();

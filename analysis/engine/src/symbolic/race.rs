@@ -17,13 +17,19 @@
 //! would. Two ways to lay a ring out are twins as well. So where two stand at the same level with as many nodes after two
 //! rounds in succession, the second drops out.
 
+use std::panic::resume_unwind;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
+use std::sync::{Mutex, PoisonError, mpsc};
+use std::thread;
+use std::time::Duration;
+
 use super::cache::ANY;
 use super::order::{Order, candidates};
 use super::ordered::Ordered;
 use super::saturation::{By, Saturation, Workshop};
 use super::space::Symbolic;
 use super::zdd::Node;
-use crate::budget::{Stop, Watch};
+use crate::budget::{CLOCK_EVERY, Stop, Watch};
 use crate::net::Transition;
 
 /// The results that a search may compute in the first round, and more for each level.
@@ -40,6 +46,9 @@ const FINALISTS: usize = 2;
 const RUNNER_UP: u64 = 4;
 const BESIDE: u64 = 8;
 const ROUNDS_ALONE: u32 = 3;
+
+/// How long a thread that has nothing left to do waits before it looks at the clock again.
+const MOMENT: Duration = Duration::from_millis(10);
 
 /// Twins differ in their nodes by at most one in so many, after so many rounds.
 const TWINS_APART: usize = 12;
@@ -59,11 +68,13 @@ struct Racer {
     ran: bool,
     /// For how many rounds in succession it has stood where one before it stands.
     alike: u32,
+    /// The results that it may still compute in this round; none where it waits, or has had its turn.
+    fuel: u64,
 }
 
 impl Racer {
     fn new(order: Order) -> Self {
-        Racer { order, is_shortest: false, spared: false, begun: None, before: 0, ran: false, alike: 0 }
+        Racer { order, is_shortest: false, spared: false, begun: None, before: 0, ran: false, alike: 0, fuel: 0 }
     }
 
     /// Whether its order is the one that the net came in, from either end.
@@ -92,7 +103,6 @@ impl Racer {
         transitions: &[Transition],
         initial: &[u32],
         room: usize,
-        fuel: u64,
         watch: &mut Watch<'_>,
     ) -> Result<Option<Node>, Stop> {
         let (ordered, search, start) = match &mut self.begun {
@@ -105,6 +115,7 @@ impl Racer {
             }
         };
         self.ran = true;
+        let fuel = std::mem::take(&mut self.fuel);
         ordered.diagram.store.memory.allow(room);
         let Ordered { diagram, blocks, parts, agendas, .. } = ordered;
         let Some(agenda) = &agendas[By::Forward as usize] else { return Ok(None) };
@@ -196,6 +207,8 @@ pub(super) struct Race {
     settled: bool,
     /// The rounds since then.
     rounds_settled: u32,
+    /// Whether two at a time have needed more memory than there is.
+    apart: bool,
 }
 
 impl Race {
@@ -225,6 +238,7 @@ impl Race {
             thinned: 0,
             settled: false,
             rounds_settled: 0,
+            apart: false,
         })
     }
 
@@ -248,33 +262,112 @@ impl Race {
         at - usize::from(gone < at)
     }
 
-    /// Goes on for a round; the markings, if a search has ended in it. Out of memory where none is left.
-    pub(super) fn round(&mut self, bytes: usize, watch: &mut Watch<'_>) -> Result<Option<Symbolic>, Stop> {
-        let mut at = 0;
-        while at < self.field.len() {
-            let others = self.field.iter().map(Racer::bytes).sum::<usize>() - self.field[at].bytes();
-            let share = match self.field[at].spared {
-                true if self.settled && self.rounds_settled < ROUNDS_ALONE => {
-                    at += 1;
-                    continue;
-                }
+    /// Gives each search what it may compute in this round.
+    fn hand_out(&mut self) {
+        let are_last = running(&self.field) <= FINALISTS;
+        for (at, racer) in self.field.iter_mut().enumerate() {
+            racer.fuel = match racer.spared {
+                true if self.settled && self.rounds_settled < ROUNDS_ALONE => 0,
                 true if self.settled => self.fuel / BESIDE,
-                false if at > 0 && running(&self.field) <= FINALISTS => self.fuel / RUNNER_UP,
+                false if at > 0 && are_last => self.fuel / RUNNER_UP,
                 _ => self.fuel,
             };
-            let room = bytes.saturating_sub(others);
-            match self.field[at].run(&self.transitions, &self.initial, room, share, watch) {
-                Ok(Some(reach)) => {
-                    if let Some(begun) = self.field.swap_remove(at).begun {
-                        self.field.clear();
-                        let net = (std::mem::take(&mut self.transitions), std::mem::take(&mut self.initial));
-                        return Ok(Some(Symbolic::found(begun, net.0, net.1, reach, bytes)));
-                    }
-                }
+        }
+    }
+
+    /// Lets those who have fuel run one after the other; who was the first to end, and with what.
+    fn in_turn(&mut self, bytes: usize, watch: &mut Watch<'_>) -> Result<Option<(usize, Node)>, Stop> {
+        let mut at = 0;
+        while at < self.field.len() {
+            if self.field[at].fuel == 0 {
+                at += 1;
+                continue;
+            }
+            let others = self.field.iter().map(Racer::bytes).sum::<usize>() - self.field[at].bytes();
+            match self.field[at].run(&self.transitions, &self.initial, bytes.saturating_sub(others), watch) {
+                Ok(Some(reach)) => return Ok(Some((at, reach))),
                 Ok(None) => at += 1,
                 Err(Stop::Memory) => at = self.give_way(at),
                 Err(stop) => return Err(stop),
             }
+        }
+        Ok(None)
+    }
+
+    /// The same, two at a time. Of those who end, the first in the field wins, as if they had run in turn.
+    ///
+    /// Who had no room beside another one has its fuel back, and all go on in turn from then on.
+    fn by_two(&mut self, bytes: usize, watch: &mut Watch<'_>) -> Result<Option<(usize, Node)>, Stop> {
+        let held = self.field.iter().map(Racer::bytes).sum();
+        let spare = bytes.saturating_sub(held) / 2;
+        let (transitions, initial, deadline) = (&self.transitions, &self.initial, watch.deadline());
+        let due = Mutex::new(self.field.iter_mut().enumerate().filter(|(_, racer)| racer.fuel > 0));
+        let (first, short, stopped) = (AtomicUsize::new(usize::MAX), AtomicBool::new(false), AtomicBool::new(false));
+        let run = |go_on: &mut dyn FnMut() -> Result<(), Stop>| {
+            let mut reached = None;
+            loop {
+                let next = due.lock().unwrap_or_else(PoisonError::into_inner).next();
+                let Some((at, racer)) = next else { return Ok(reached) };
+                let mut poll = |_| if first.load(Relaxed) < at { Err(Stop::Cancelled) } else { go_on() };
+                let (room, fuel) = (racer.bytes() + spare, racer.fuel);
+                match racer.run(transitions, initial, room, &mut Watch::often(deadline, &mut poll)) {
+                    Ok(Some(reach)) => {
+                        first.fetch_min(at, Relaxed);
+                        reached = Some((at, reach));
+                    }
+                    Ok(None) => {}
+                    Err(Stop::Memory) => {
+                        (racer.begun, racer.fuel) = (None, fuel);
+                        short.store(true, Relaxed);
+                    }
+                    Err(_) if first.load(Relaxed) < at => {}
+                    Err(stop) => return Err(stop),
+                }
+                if first.load(Relaxed) < usize::MAX {
+                    return Ok(reached); // who comes later in the field has lost
+                }
+            }
+        };
+        let (here, there) = thread::scope(|scope| {
+            let (ended, ends) = mpsc::channel::<()>();
+            let (run, stopped) = (&run, &stopped);
+            let beside = move || {
+                let _ended = ended; // which the other one hears
+                run(&mut || if stopped.load(Relaxed) { Err(Stop::Cancelled) } else { Ok(()) })
+            };
+            // Where the system has no thread to give, one does it all.
+            let other = thread::Builder::new().spawn_scoped(scope, beside).ok();
+            let mut look = || watch.tick(CLOCK_EVERY);
+            let mut here = run(&mut look);
+            while here.is_ok() && ends.recv_timeout(MOMENT) == Err(mpsc::RecvTimeoutError::Timeout) {
+                here = look().and(here);
+            }
+            stopped.store(here.is_err(), Relaxed);
+            let there = other.map_or(Ok(None), |other| other.join().unwrap_or_else(|panic| resume_unwind(panic)));
+            (here, there)
+        });
+        self.apart |= short.into_inner();
+        // The second one only hears that it must end; the first knows why.
+        let both = [here?, there?];
+        Ok(both.into_iter().flatten().min_by_key(|&(at, _)| at))
+    }
+
+    /// Goes on for a round; the markings, if a search has ended in it. Out of memory where none is left.
+    pub(super) fn round(&mut self, bytes: usize, watch: &mut Watch<'_>) -> Result<Option<Symbolic>, Stop> {
+        self.hand_out();
+        let mut ended = None;
+        if self.spent > 0 && !self.apart && self.field.len() > 1 && watch.second_is_free() {
+            ended = self.by_two(bytes, watch)?;
+        }
+        if ended.is_none() {
+            ended = self.in_turn(bytes, watch)?;
+        }
+        if let Some((at, reach)) = ended
+            && let Some(begun) = self.field.swap_remove(at).begun
+        {
+            self.field.clear();
+            let net = (std::mem::take(&mut self.transitions), std::mem::take(&mut self.initial));
+            return Ok(Some(Symbolic::found(begun, net.0, net.1, reach, bytes)));
         }
         if self.field.is_empty() {
             return Err(Stop::Memory);
@@ -327,7 +420,8 @@ mod tests {
         let marked: Vec<u32> = (1..transitions.len() as u32 / 2).step_by(3).collect();
         for (at, racer) in field.iter_mut().enumerate() {
             let mut poll = unwatched;
-            let ended = racer.run(transitions, &marked, ROOM, fuel(at), &mut Watch::new(None, &mut poll));
+            racer.fuel = fuel(at);
+            let ended = racer.run(transitions, &marked, ROOM, &mut Watch::new(None, &mut poll));
             assert_eq!(ended, Ok(None));
         }
         drop_twins(field);
@@ -464,6 +558,57 @@ mod tests {
             assert_eq!(found.is_some(), ends);
             assert_eq!((race.thinned, race.field.len() < all), (u32::from(!ends), true));
         }
+    }
+
+    /// A race whose rounds are so short that nothing is over in the first of them, gone on with by one thread or two.
+    fn raced(bytes: usize, first: u64, by_two: bool) -> (Result<Symbolic, Stop>, bool) {
+        let (places, transitions, initial) = vehicles(4, 16);
+        let (second, mut poll) = (AtomicBool::new(by_two), unwatched);
+        let watch = &mut Watch::new(None, &mut poll).with_second(Some(&second));
+        let mut race = Race::new(places, (transitions, initial), None, watch).expect("enough room");
+        (race.first, race.fuel) = (first, first);
+        loop {
+            match race.round(bytes, watch) {
+                Ok(None) => {}
+                Ok(Some(found)) => return (Ok(found), race.apart),
+                Err(stop) => return (Err(stop), race.apart),
+            }
+        }
+    }
+
+    #[test]
+    fn by_two_threads_the_same_search_wins_as_by_one() {
+        // Over after many rounds, after some, and all in the second.
+        for first in [SLOW, 20 * SLOW, 1 << 24] {
+            let [one, two] = [false, true].map(|by_two| raced(1 << 30, first, by_two));
+            let [one, two] = [one, two].map(|(found, apart)| (found.expect("enough room"), apart));
+            assert_eq!((one.0.place_at(), one.0.fired, one.0.nodes), (two.0.place_at(), two.0.fired, two.0.nodes));
+            assert_eq!((one.1, two.1), (false, false));
+        }
+    }
+
+    #[test]
+    fn where_memory_does_not_do_for_two_at_a_time_one_goes_on_after_the_other() {
+        let mut bytes = 1 << 16;
+        while raced(bytes, SLOW, false).0.is_err() {
+            bytes += bytes / 4;
+        }
+        let (found, apart) = raced(bytes, SLOW, true);
+        assert_eq!((found.map(|_| ()), apart), (Ok(()), true));
+    }
+
+    #[test]
+    fn two_threads_end_when_the_caller_says_so() {
+        let (places, transitions, initial) = vehicles(8, 24);
+        let (second, mut poll) = (AtomicBool::new(true), unwatched);
+        let net = (transitions, initial);
+        let mut race = Race::new(places, net, None, &mut Watch::new(None, &mut poll)).expect("enough room");
+        (race.first, race.fuel) = (SLOW, SLOW);
+        assert!(race.round(1 << 30, &mut Watch::new(None, &mut poll)).is_ok_and(|found| found.is_none()));
+        race.fuel = 1 << 40;
+        let mut poll = |_| Err(Stop::Interrupted);
+        let watch = &mut Watch::new(None, &mut poll).with_second(Some(&second));
+        assert_eq!(race.round(1 << 30, watch).map(|_| ()), Err(Stop::Interrupted));
     }
 
     #[test]
