@@ -561,8 +561,8 @@ mod tests {
     }
 
     /// A race whose rounds are so short that nothing is over in the first of them, gone on with by one thread or two.
-    fn raced(bytes: usize, first: u64, by_two: bool) -> (Result<Symbolic, Stop>, bool) {
-        let (places, transitions, initial) = vehicles(4, 16);
+    fn raced(count: u32, bytes: usize, first: u64, by_two: bool) -> (Result<Symbolic, Stop>, bool) {
+        let (places, transitions, initial) = vehicles(count, 4 * count);
         let (second, mut poll) = (AtomicBool::new(by_two), unwatched);
         let watch = &mut Watch::new(None, &mut poll).with_second(Some(&second));
         let mut race = Race::new(places, (transitions, initial), None, watch).expect("enough room");
@@ -580,7 +580,7 @@ mod tests {
     fn by_two_threads_the_same_search_wins_as_by_one() {
         // Over after many rounds, after some, and all in the second.
         for first in [SLOW, 20 * SLOW, 1 << 24] {
-            let [one, two] = [false, true].map(|by_two| raced(1 << 30, first, by_two));
+            let [one, two] = [false, true].map(|by_two| raced(4, 1 << 30, first, by_two));
             let [one, two] = [one, two].map(|(found, apart)| (found.expect("enough room"), apart));
             assert_eq!((one.0.place_at(), one.0.fired, one.0.nodes), (two.0.place_at(), two.0.fired, two.0.nodes));
             assert_eq!((one.1, two.1), (false, false));
@@ -590,10 +590,10 @@ mod tests {
     #[test]
     fn where_memory_does_not_do_for_two_at_a_time_one_goes_on_after_the_other() {
         let mut bytes = 1 << 16;
-        while raced(bytes, SLOW, false).0.is_err() {
+        while raced(3, bytes, SLOW, false).0.is_err() {
             bytes += bytes / 4;
         }
-        let (found, apart) = raced(bytes, SLOW, true);
+        let (found, apart) = raced(3, bytes, SLOW, true);
         assert_eq!((found.map(|_| ()), apart), (Ok(()), true));
     }
 
