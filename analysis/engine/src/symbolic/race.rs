@@ -16,6 +16,11 @@
 //! where it does not, the two are *twins*: the net looks the same from both ends, and one search says what the other
 //! would. Two ways to lay a ring out are twins as well. So where two stand at the same level with as many nodes after two
 //! rounds in succession, the second drops out.
+//!
+//! Where a second processor is free, two searches run at a time from the second round on: most nets are done in the
+//! first, sooner than a thread begins. A round is the same as if they had run in turn: of those that end in it the first
+//! in the field wins, and the others are left. Two threads on one diagram were rejected: every node that is made would be
+//! a lock, while searches in two orders share nothing but the net.
 
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
