@@ -353,7 +353,7 @@ def _held(of: Technique[Callable[[Net, Limits], StateSpace[Any]]], net: Net, lim
 
 
 def _by_two_when_alone(contestants: Sequence[_Contestant], is_idle: Callable[[], bool]) -> list[_Contestant]:
-    """The same, who each work by a second thread too once all others have ended and whatever else runs is idle."""
+    """The same, who each work by a second thread too once all others have ended and `is_idle` says so of all else."""
     ended = [Event() for _ in contestants]
 
     def run(own: int, limits: Limits) -> StateSpace[Any] | None:

@@ -97,7 +97,7 @@ class Image:
                 yield Change(name, shows)
 
     def _lose(self, name: str, why: str) -> list[str]:
-        """Follow the loss policy of a signal; returns its name if that makes a fault, once for each loss."""
+        """Follow the loss policy of a signal; returns its name if that makes a fault, once for each reason."""
         reading, policy = self.readings[name], self.signals[name].on_loss
         match policy:
             case "hold":
@@ -105,7 +105,7 @@ class Image:
                 self.readings[name] = replace(reading, quality=quality, why=why)
             case "fault":
                 self.readings[name] = replace(reading, quality=Quality.BAD, why=why)
-                return [name] if reading.why != why else []  # or a device that is polled would be told of at each poll
+                return [name] if reading.why != why else []  # else told at each poll
             case "0" | "1":
                 self.readings[name] = replace(reading, value=policy == "1", quality=Quality.BAD, why=why)
         return []

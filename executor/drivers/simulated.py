@@ -172,7 +172,7 @@ class SimulatedDriver:
 
     def _start(self, at_seconds: float) -> None:
         self._input(at_seconds, "start")
-        if self.plant.is_closed:
+        if self.plant.is_closed and not self.plant.faulted:
             self._input(at_seconds, "open")
 
     def _input(self, at_seconds: float, what: str, *arguments: str | int) -> None:

@@ -125,7 +125,7 @@ def searched(name: str, **limits: Any) -> _engine.Diagram:
 
 
 def test_by_two_threads_the_same_order_wins_the_race_as_by_one() -> None:
-    one, two = (searched("vehicles-6-24", threads=n) for n in (1, 2))
+    one, two = (searched("vehicles-8-32", threads=n) for n in (1, 2))  # which takes more than a round
     assert (one.order, one.n_nodes, one.reach().count()) == (two.order, two.n_nodes, two.reach().count())
 
 

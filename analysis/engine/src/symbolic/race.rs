@@ -197,6 +197,31 @@ fn drop_twins(field: &mut Vec<Racer>) {
     field.iter_mut().for_each(|racer| racer.ran = false);
 }
 
+/// Where two threads take who is next, and the room that there is for it to grow.
+struct Desk<I> {
+    due: I,
+    /// The bytes that nobody holds or was granted.
+    left: usize,
+    running: usize,
+}
+
+impl<I: Iterator> Desk<I> {
+    /// Who is next, and how much it may grow: by half of what is left, or by all of it where the other half is granted.
+    fn next(&mut self) -> Option<(I::Item, usize)> {
+        let next = self.due.next()?;
+        let granted = self.left / (2 - self.running.min(1));
+        self.left -= granted;
+        self.running += 1;
+        Some((next, granted))
+    }
+
+    /// Takes back what was granted and is not held.
+    fn take_back(&mut self, bytes: usize) {
+        self.left += bytes;
+        self.running -= 1;
+    }
+}
+
 /// The searches for the markings of one net, each in an order of its own.
 pub(super) struct Race {
     transitions: Vec<Transition>,
@@ -280,6 +305,11 @@ impl Race {
         }
     }
 
+    /// The bytes that all searches hold.
+    fn held(&self) -> usize {
+        self.field.iter().map(Racer::bytes).sum()
+    }
+
     /// Lets those who have fuel run one after the other; who was the first to end, and with what.
     fn in_turn(&mut self, bytes: usize, watch: &mut Watch<'_>) -> Result<Option<(usize, Node)>, Stop> {
         let mut at = 0;
@@ -288,11 +318,15 @@ impl Race {
                 at += 1;
                 continue;
             }
-            let others = self.field.iter().map(Racer::bytes).sum::<usize>() - self.field[at].bytes();
+            let others = self.held() - self.field[at].bytes();
+            let fuel = self.field[at].fuel;
             match self.field[at].run(&self.transitions, &self.initial, bytes.saturating_sub(others), watch) {
                 Ok(Some(reach)) => return Ok(Some((at, reach))),
                 Ok(None) => at += 1,
-                Err(Stop::Memory) => at = self.give_way(at),
+                Err(Stop::Memory) => {
+                    self.field[at].fuel = fuel; // it begins again
+                    at = self.give_way(at);
+                }
                 Err(stop) => return Err(stop),
             }
         }
@@ -303,29 +337,32 @@ impl Race {
     ///
     /// Who had no room beside another one has its fuel back, and all go on in turn from then on.
     fn by_two(&mut self, bytes: usize, watch: &mut Watch<'_>) -> Result<Option<(usize, Node)>, Stop> {
-        let held = self.field.iter().map(Racer::bytes).sum();
-        let spare = bytes.saturating_sub(held) / 2;
+        let left = bytes.saturating_sub(self.held());
         let (transitions, initial, deadline) = (&self.transitions, &self.initial, watch.deadline());
-        let due = Mutex::new(self.field.iter_mut().enumerate().filter(|(_, racer)| racer.fuel > 0));
+        let due = self.field.iter_mut().enumerate().filter(|(_, racer)| racer.fuel > 0);
+        let desk = Mutex::new(Desk { due, left, running: 0 });
         let (first, short, stopped) = (AtomicUsize::new(usize::MAX), AtomicBool::new(false), AtomicBool::new(false));
         let run = |go_on: &mut dyn FnMut() -> Result<(), Stop>| {
             let mut reached = None;
             loop {
-                let next = due.lock().unwrap_or_else(PoisonError::into_inner).next();
-                let Some((at, racer)) = next else { return Ok(reached) };
+                let next = desk.lock().unwrap_or_else(PoisonError::into_inner).next();
+                let Some(((at, racer), granted)) = next else { return Ok(reached) };
                 let mut poll = |_| if first.load(Relaxed) < at { Err(Stop::Cancelled) } else { go_on() };
-                let (room, fuel) = (racer.bytes() + spare, racer.fuel);
-                match racer.run(transitions, initial, room, &mut Watch::often(deadline, &mut poll)) {
+                let (room, fuel) = (racer.bytes() + granted, racer.fuel);
+                let ended = racer.run(transitions, initial, room, &mut Watch::often(deadline, &mut poll));
+                if ended == Err(Stop::Memory) {
+                    (racer.begun, racer.fuel) = (None, fuel);
+                }
+                desk.lock().unwrap_or_else(PoisonError::into_inner).take_back(room.saturating_sub(racer.bytes()));
+                match ended {
                     Ok(Some(reach)) => {
                         first.fetch_min(at, Relaxed);
                         reached = Some((at, reach));
                     }
                     Ok(None) => {}
-                    Err(Stop::Memory) => {
-                        (racer.begun, racer.fuel) = (None, fuel);
-                        short.store(true, Relaxed);
-                    }
-                    Err(_) if first.load(Relaxed) < at => {}
+                    Err(Stop::Memory) => short.store(true, Relaxed),
+                    // Who has lost hears that it must end, or that time is over; what a handler raised comes out.
+                    Err(Stop::Cancelled | Stop::Time) if first.load(Relaxed) < at => {}
                     Err(stop) => return Err(stop),
                 }
                 if first.load(Relaxed) < usize::MAX {
@@ -361,6 +398,7 @@ impl Race {
     pub(super) fn round(&mut self, bytes: usize, watch: &mut Watch<'_>) -> Result<Option<Symbolic>, Stop> {
         self.hand_out();
         let mut ended = None;
+        self.apart |= self.held() > bytes / 2; // one that was alone would have room for more than half of what is left
         if self.spent > 0 && !self.apart && self.field.len() > 1 && watch.second_is_free() {
             ended = self.by_two(bytes, watch)?;
         }
@@ -600,6 +638,40 @@ mod tests {
         }
         let (found, apart) = raced(3, bytes, SLOW, true);
         assert_eq!((found.map(|_| ()), apart), (Ok(()), true));
+    }
+
+    #[test]
+    fn two_threads_hold_no_more_than_is_allowed() {
+        let (places, transitions, initial) = vehicles(6, 24);
+        let other: Order = (0..places as u32).map(|at| at * 11 % places as u32).collect();
+        let along: Order = (0..places as u32).collect();
+        let back = |order: &Order| order.iter().rev().copied().collect::<Order>();
+        let all = vec![along.clone(), back(&along), other.clone(), back(&other)];
+        let (second, mut poll) = (AtomicBool::new(true), unwatched);
+        let watch = &mut Watch::new(None, &mut poll).with_second(Some(&second));
+        let mut race = Race::new(places, (transitions, initial), Some(all), watch).expect("enough room");
+        (race.first, race.fuel) = (SLOW, SLOW);
+        assert!(race.round(1 << 30, watch).is_ok_and(|found| found.is_none()));
+        let bytes = 2 * race.held();
+        (race.fuel, race.first) = (1 << 18, 1 << 30);
+        race.hand_out();
+        assert!(race.by_two(bytes, watch).is_ok_and(|found| found.is_none()));
+        assert!(race.apart && race.held() <= bytes);
+    }
+
+    #[test]
+    fn who_begins_again_where_another_one_has_given_way_runs_in_the_same_round() {
+        let (places, transitions, initial) = vehicles(6, 24);
+        let along: Order = (0..places as u32).collect();
+        let (all, mut poll) = (vec![along.clone(), along.into_iter().rev().collect()], unwatched);
+        let watch = &mut Watch::new(None, &mut poll);
+        let mut race = Race::new(places, (transitions, initial), Some(all), watch).expect("enough room");
+        (race.first, race.fuel) = (SLOW, SLOW);
+        while race.field.len() == 2 {
+            let bytes = if race.spent == 0 { 1 << 30 } else { race.held() + race.held() / 4 };
+            assert!(race.round(bytes, watch).is_ok_and(|found| found.is_none()));
+        }
+        assert!(race.field[0].begun.is_some());
     }
 
     #[test]
