@@ -446,7 +446,7 @@ class LocalController:
         return transition.enabled(self.word)
 
     def _uncommanded(self) -> Word:
-        """The places with a time limit for whose completion no command was ever sent: a token of the start has no time."""
+        """The places with a time limit for whose completion no command was sent: a token there came with the start."""
         limited = self.timers.places.values()
         names = (p.name for p in limited if p.completion is not None and not self.commands.entry(p.completion))
         return sum(1 << self.subnet.place_index[name] for name in names)
