@@ -13,6 +13,7 @@
 //! claims its bytes, so that running out of either is a return value. Nodes with several places each, in a store of their
 //! own, were rejected: what is many-valued in a net is a search's to know, and all else is simpler with one place a level.
 
+mod abreast;
 pub mod algebra;
 mod blocks;
 pub mod cache;
@@ -30,6 +31,7 @@ mod ordered;
 mod parts;
 mod passing;
 pub mod race;
+mod racer;
 mod saturation;
 pub mod space;
 mod spectral;

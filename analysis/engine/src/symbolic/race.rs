@@ -22,19 +22,12 @@
 //! in the field wins, and the others are left. Two threads on one diagram were rejected: every node that is made would be
 //! a lock, while searches in two orders share nothing but the net.
 
-use std::panic::resume_unwind;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
-use std::sync::{Mutex, PoisonError, mpsc};
-use std::thread;
-use std::time::Duration;
-
-use super::cache::ANY;
+use super::abreast::abreast;
 use super::order::{Order, candidates};
-use super::ordered::Ordered;
-use super::saturation::{By, Saturation, Workshop};
+use super::racer::Racer;
 use super::space::Symbolic;
 use super::zdd::Node;
-use crate::budget::{CLOCK_EVERY, Stop, Watch};
+use crate::budget::{Stop, Watch};
 use crate::net::Transition;
 
 /// The results that a search may compute in the first round, and more for each level.
@@ -52,81 +45,9 @@ const RUNNER_UP: u64 = 4;
 const BESIDE: u64 = 8;
 const ROUNDS_ALONE: u32 = 3;
 
-/// How long a thread that has nothing left to do waits before it looks at the clock again.
-const MOMENT: Duration = Duration::from_millis(10);
-
 /// Twins differ in their nodes by at most one in so many, after so many rounds.
 const TWINS_APART: usize = 12;
 const ROUNDS_ALIKE: u32 = 2;
-
-/// A search in one order, which may be left and gone on with.
-struct Racer {
-    order: Order,
-    /// Whether no other order has shorter arcs, but for its reverse.
-    is_shortest: bool,
-    /// Whether others run for the first places, and this one beside them.
-    spared: bool,
-    begun: Option<(Ordered, Saturation, Node)>,
-    /// The level that was reached before the last round.
-    before: u32,
-    /// Whether it has run since twins were last looked for, and not waited.
-    ran: bool,
-    /// For how many rounds in succession it has stood where one before it stands.
-    alike: u32,
-    /// The results that it may still compute in this round; none where it waits, or has had its turn.
-    fuel: u64,
-}
-
-impl Racer {
-    fn new(order: Order) -> Self {
-        Racer { order, is_shortest: false, spared: false, begun: None, before: 0, ran: false, alike: 0, fuel: 0 }
-    }
-
-    /// Whether its order is the one that the net came in, from either end.
-    fn is_as_given(&self) -> bool {
-        self.order.is_sorted() || self.order.iter().rev().is_sorted()
-    }
-
-    /// Whether the order of another one is the reverse of this one's.
-    fn is_reverse_of(&self, other: &Racer) -> bool {
-        self.order.iter().eq(other.order.iter().rev())
-    }
-
-    fn bytes(&self) -> usize {
-        self.begun.as_ref().map_or(0, |(ordered, ..)| ordered.diagram.store.memory.used())
-    }
-
-    /// Levels done and nodes made.
-    fn standing(&self) -> (u32, usize) {
-        self.begun.as_ref().map_or((0, usize::MAX), |(ordered, search, _)| {
-            (search.reached(&ordered.blocks, &ordered.diagram), ordered.diagram.store.used())
-        })
-    }
-
-    fn run(
-        &mut self,
-        transitions: &[Transition],
-        initial: &[u32],
-        room: usize,
-        watch: &mut Watch<'_>,
-    ) -> Result<Option<Node>, Stop> {
-        let (ordered, search, start) = match &mut self.begun {
-            Some(begun) => begun,
-            none => {
-                let mut ordered = Ordered::new(transitions, initial, &self.order, room)?;
-                let start = ordered.single(initial)?;
-                let search = Saturation::new(&ordered.diagram, &ordered.blocks, start, ANY, By::Forward)?;
-                none.insert((ordered, search, start))
-            }
-        };
-        self.ran = true;
-        let fuel = std::mem::take(&mut self.fuel);
-        ordered.diagram.store.memory.allow(room);
-        let Ordered { diagram, blocks, parts, agendas, .. } = ordered;
-        let Some(agenda) = &agendas[By::Forward as usize] else { return Ok(None) };
-        search.run(&mut Workshop { diagram, blocks, parts, agenda, roots: &[*start] }, fuel, watch)
-    }
-}
 
 /// Keeps half of the field: in turn who has the fewest rounds to go at the pace of the last one, who has come farthest,
 /// and who has the fewest nodes for it. None of the three alone tells who wins. Of the last two, the first by pace leads,
@@ -195,31 +116,6 @@ fn drop_twins(field: &mut Vec<Racer>) {
         }
     }
     field.iter_mut().for_each(|racer| racer.ran = false);
-}
-
-/// Where two threads take who is next, and the room that there is for it to grow.
-struct Desk<I> {
-    due: I,
-    /// The bytes that nobody holds or was granted.
-    left: usize,
-    running: usize,
-}
-
-impl<I: Iterator> Desk<I> {
-    /// Who is next, and how much it may grow: by half of what is left, or by all of it where the other half is granted.
-    fn next(&mut self) -> Option<(I::Item, usize)> {
-        let next = self.due.next()?;
-        let granted = self.left / (2 - self.running.min(1));
-        self.left -= granted;
-        self.running += 1;
-        Some((next, granted))
-    }
-
-    /// Takes back what was granted and is not held.
-    fn take_back(&mut self, bytes: usize) {
-        self.left += bytes;
-        self.running -= 1;
-    }
 }
 
 /// The searches for the markings of one net, each in an order of its own.
@@ -333,65 +229,12 @@ impl Race {
         Ok(None)
     }
 
-    /// The same, two at a time. Of those who end, the first in the field wins, as if they had run in turn.
-    ///
-    /// Who had no room beside another one has its fuel back, and all go on in turn from then on.
+    /// The same, two at a time, as if they had run in turn; where memory was short, all go on in turn from then on.
     fn by_two(&mut self, bytes: usize, watch: &mut Watch<'_>) -> Result<Option<(usize, Node)>, Stop> {
         let left = bytes.saturating_sub(self.held());
-        let (transitions, initial, deadline) = (&self.transitions, &self.initial, watch.deadline());
-        let due = self.field.iter_mut().enumerate().filter(|(_, racer)| racer.fuel > 0);
-        let desk = Mutex::new(Desk { due, left, running: 0 });
-        let (first, short, stopped) = (AtomicUsize::new(usize::MAX), AtomicBool::new(false), AtomicBool::new(false));
-        let run = |go_on: &mut dyn FnMut() -> Result<(), Stop>| {
-            let mut reached = None;
-            loop {
-                let next = desk.lock().unwrap_or_else(PoisonError::into_inner).next();
-                let Some(((at, racer), granted)) = next else { return Ok(reached) };
-                let mut poll = |_| if first.load(Relaxed) < at { Err(Stop::Cancelled) } else { go_on() };
-                let (room, fuel) = (racer.bytes() + granted, racer.fuel);
-                let ended = racer.run(transitions, initial, room, &mut Watch::often(deadline, &mut poll));
-                if ended == Err(Stop::Memory) {
-                    (racer.begun, racer.fuel) = (None, fuel);
-                }
-                desk.lock().unwrap_or_else(PoisonError::into_inner).take_back(room.saturating_sub(racer.bytes()));
-                match ended {
-                    Ok(Some(reach)) => {
-                        first.fetch_min(at, Relaxed);
-                        reached = Some((at, reach));
-                    }
-                    Ok(None) => {}
-                    Err(Stop::Memory) => short.store(true, Relaxed),
-                    // Who has lost hears that it must end, or that time is over; what a handler raised comes out.
-                    Err(Stop::Cancelled | Stop::Time) if first.load(Relaxed) < at => {}
-                    Err(stop) => return Err(stop),
-                }
-                if first.load(Relaxed) < usize::MAX {
-                    return Ok(reached); // who comes later in the field has lost
-                }
-            }
-        };
-        let (here, there) = thread::scope(|scope| {
-            let (ended, ends) = mpsc::channel::<()>();
-            let (run, stopped) = (&run, &stopped);
-            let beside = move || {
-                let _ended = ended; // which the other one hears
-                run(&mut || if stopped.load(Relaxed) { Err(Stop::Cancelled) } else { Ok(()) })
-            };
-            // Where the system has no thread to give, one does it all.
-            let other = thread::Builder::new().spawn_scoped(scope, beside).ok();
-            let mut look = || watch.tick(CLOCK_EVERY);
-            let mut here = run(&mut look);
-            while here.is_ok() && ends.recv_timeout(MOMENT) == Err(mpsc::RecvTimeoutError::Timeout) {
-                here = look().and(here);
-            }
-            stopped.store(here.is_err(), Relaxed);
-            let there = other.map_or(Ok(None), |other| other.join().unwrap_or_else(|panic| resume_unwind(panic)));
-            (here, there)
-        });
-        self.apart |= short.into_inner();
-        // The second one only hears that it must end; the first knows why.
-        let both = [here?, there?];
-        Ok(both.into_iter().flatten().min_by_key(|&(at, _)| at))
+        let (ended, short) = abreast(&mut self.field, (&self.transitions, &self.initial), left, watch)?;
+        self.apart |= short;
+        Ok(ended)
     }
 
     /// Goes on for a round; the markings, if a search has ended in it. Out of memory where none is left.
@@ -439,6 +282,8 @@ impl Race {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::AtomicBool;
+
     use super::*;
     use crate::budget::unwatched;
 
