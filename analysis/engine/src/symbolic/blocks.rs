@@ -96,6 +96,7 @@ impl Blocks {
         let (offsets, joined) = literals.by_level(levels);
         let mut widths: HashMap<(u32, Vec<Local>), usize, Mixed> = HashMap::default();
         let mut seen = vec![0_u32; literals.len()];
+        let mut known = vec![0_u64; (1 << WIDTH_MAX) / 64];
         let (mut of, mut low) = (vec![0], vec![0]);
         let (mut start, mut work) = (1, 0);
         while start <= levels {
@@ -109,7 +110,7 @@ impl Blocks {
             window.sort_unstable();
             window.dedup();
             let first = (0..most).fold(0, |value, at| value | u32::from(marked[start + at]) << at);
-            let best = |(first, window): &(u32, Vec<Local>)| width(*first, window, most, &mut work);
+            let best = |(first, window): &(u32, Vec<Local>)| width(*first, window, most, &mut known, &mut work);
             let width = *widths.entry((first, window)).or_insert_with_key(best);
             of.resize(start + width, low.len() as u32);
             low.push(start as u32);
@@ -168,32 +169,43 @@ fn local(literals: &[(u32, Kind)], start: u32, width: u32) -> Local {
     found
 }
 
-/// How many places from the first of a window make the best block.
-fn width(first: u32, window: &[Local], most: usize, work: &mut usize) -> usize {
+/// How many places from the first of a window make the best block; `known` is a set of values that is empty.
+fn width(first: u32, window: &[Local], most: usize, known: &mut [u64], work: &mut usize) -> usize {
     let (mut best, mut width) = (usize::MAX, 1);
+    let mut moves: Vec<Local> = Vec::with_capacity(window.len());
+    let mut values: Vec<u32> = Vec::with_capacity(VALUES_MAX + window.len());
     for places in 1..=most {
         let mask = u32::MAX >> (32 - places);
-        let mut moves: Vec<Local> = window.iter().map(|local| local.map(|bits| bits & mask)).collect();
-        moves.retain(|local| local[2] != 0);
+        moves.clear();
+        moves.extend(window.iter().map(|local| local.map(|bits| bits & mask)).filter(|local| local[2] != 0));
         moves.sort_unstable();
         moves.dedup();
         *work += window.len();
-        let mut values = vec![first & mask];
+        let mut found = |value: u32, values: &mut Vec<u32>| {
+            let (word, bit) = (value as usize / 64, 1 << (value % 64));
+            if known[word] & bit == 0 {
+                known[word] |= bit;
+                values.push(value);
+            }
+        };
+        found(first & mask, &mut values);
         let mut at = 0;
         while at < values.len() && values.len() <= VALUES_MAX {
             let value = values[at];
             at += 1;
             *work += moves.len();
             for [full, empty, flip] in &moves {
-                if value & full == *full && value & empty == 0 && !values.contains(&(value ^ flip)) {
-                    values.push(value ^ flip);
+                if value & full == *full && value & empty == 0 {
+                    found(value ^ flip, &mut values);
                 }
             }
         }
-        if values.len() > VALUES_MAX {
+        let count = values.len();
+        values.drain(..).for_each(|value| known[value as usize / 64] = 0);
+        if count > VALUES_MAX {
             continue;
         }
-        let cost = (values.len() + OVERHEAD) * 1000 / places;
+        let cost = (count + OVERHEAD) * 1000 / places;
         if cost <= best {
             (best, width) = (cost, places);
         }

@@ -84,7 +84,9 @@ pub type Mixed = BuildHasherDefault<Mixer>;
 
 impl Hasher for Mixer {
     fn write(&mut self, bytes: &[u8]) {
-        bytes.iter().for_each(|&byte| self.write_u32(u32::from(byte)));
+        let (words, rest) = bytes.as_chunks::<4>();
+        words.iter().for_each(|&word| self.write_u32(u32::from_ne_bytes(word)));
+        rest.iter().for_each(|&byte| self.write_u32(u32::from(byte)));
     }
 
     fn write_u32(&mut self, word: u32) {

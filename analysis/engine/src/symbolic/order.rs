@@ -158,6 +158,11 @@ impl Graph {
         added
     }
 
+    /// An order whose arcs are made shorter as long as that goes.
+    fn shortened(&self, order: Order) -> Order {
+        self.slide(self.force(order))
+    }
+
     pub(super) fn slide(&self, mut order: Order) -> Order {
         let ends = (self.places..self.vertices()).map(|t| self.degree(t as u32).pow(2)).sum::<usize>();
         let mut level = vec![0_u32; self.places];
@@ -208,43 +213,66 @@ fn of_both<A, B: Send>(second: bool, one: impl FnOnce() -> A, other: impl Fn() -
     })
 }
 
-/// Orders worth trying, those with the shorter arcs first, each followed by its reverse.
-///
-/// The watch is asked between two of them, each of which has work of its own that is bounded.
-pub fn candidates(places: usize, transitions: &[Transition], watch: &mut Watch<'_>) -> Result<Vec<Order>, Stop> {
-    let graph = Graph::new(places, transitions);
-    let as_given: Order = (0..places as u32).collect();
-    let both = |order: Order| [order.clone(), order.into_iter().rev().collect::<Order>()];
-    let span = |pair: &[Order; 2]| graph.span(&pair[0]);
-    let shortened = |order: Order| both(graph.slide(graph.force(order)));
-    watch.tick(BETWEEN)?;
-    let ((sloan, given), (cuthill_mckee, hubs)) = of_both(
-        watch.second_is_free(),
-        || (shortened(graph.sloan()), [graph.slide(as_given.clone()), as_given].map(both)),
-        || (shortened(graph.cuthill_mckee()), graph.by_hub(transitions)),
-    );
-    watch.tick(BETWEEN)?;
-    let mut found = vec![sloan, cuthill_mckee];
-    let best = found.iter().min_by_key(|pair| span(pair)).map(|pair| &pair[0]);
-    let spectral = best.map(|best| graph.spectral(best, watch)).transpose()?.flatten();
-    let spectral = spectral.map(|order| both(graph.slide(order)));
-    watch.tick(BETWEEN)?;
-    if let Some(hubs) = hubs {
-        // Where the hubs give the shorter arcs, what was found is as good but for disorder within the hubs.
-        if found.iter().all(|pair| span(&hubs) < span(pair)) {
-            found.clear();
-        }
-        found.push(hubs);
+/// The making of orders: one first, with which most nets are done, and the others when it is seen that this one is not.
+pub(super) struct Candidates {
+    graph: Graph,
+    sloan: Order,
+}
+
+impl Candidates {
+    pub(super) fn new(places: usize, transitions: &[Transition], watch: &mut Watch<'_>) -> Result<Self, Stop> {
+        watch.tick(BETWEEN)?;
+        let graph = Graph::new(places, transitions);
+        let sloan = graph.shortened(graph.sloan());
+        Ok(Candidates { graph, sloan })
     }
-    found.extend(given.into_iter().chain(spectral));
-    found.sort_by_cached_key(span);
-    let mut distinct: Vec<[Order; 2]> = Vec::new();
-    for pair in found {
-        if !distinct.iter().any(|other| other.contains(&pair[0])) {
-            distinct.push(pair);
-        }
+
+    /// The first order and its reverse.
+    pub(super) fn first(&self) -> [Order; 2] {
+        both(self.sloan.clone())
     }
-    Ok(distinct.into_iter().flatten().collect())
+
+    /// Orders worth trying, those with the shorter arcs first, each followed by its reverse.
+    ///
+    /// The watch is asked between two of them, each of which has work of its own that is bounded.
+    pub(super) fn all(self, transitions: &[Transition], watch: &mut Watch<'_>) -> Result<Vec<Order>, Stop> {
+        let Candidates { graph, sloan } = self;
+        let as_given: Order = (0..graph.places as u32).collect();
+        let span = |pair: &[Order; 2]| graph.span(&pair[0]);
+        watch.tick(BETWEEN)?;
+        let (given, (cuthill_mckee, hubs)) = of_both(
+            watch.second_is_free(),
+            || [graph.slide(as_given.clone()), as_given].map(both),
+            || (both(graph.shortened(graph.cuthill_mckee())), graph.by_hub(transitions)),
+        );
+        watch.tick(BETWEEN)?;
+        let mut found = vec![both(sloan), cuthill_mckee];
+        let best = found.iter().min_by_key(|pair| span(pair)).map(|pair| &pair[0]);
+        let spectral = best.map(|best| graph.spectral(best, watch)).transpose()?.flatten();
+        let spectral = spectral.map(|order| both(graph.slide(order)));
+        watch.tick(BETWEEN)?;
+        if let Some(hubs) = hubs {
+            // Where the hubs give the shorter arcs, what was found is as good but for disorder within the hubs.
+            if found.iter().all(|pair| span(&hubs) < span(pair)) {
+                found.clear();
+            }
+            found.push(hubs);
+        }
+        found.extend(given.into_iter().chain(spectral));
+        found.sort_by_cached_key(span);
+        let mut distinct: Vec<[Order; 2]> = Vec::new();
+        for pair in found {
+            if !distinct.iter().any(|other| other.contains(&pair[0])) {
+                distinct.push(pair);
+            }
+        }
+        Ok(distinct.into_iter().flatten().collect())
+    }
+}
+
+/// An order and its reverse.
+fn both(order: Order) -> [Order; 2] {
+    [order.clone(), order.into_iter().rev().collect()]
 }
 
 #[cfg(test)]
@@ -254,7 +282,8 @@ mod tests {
 
     fn made(places: usize, transitions: &[Transition]) -> Vec<Order> {
         let mut poll = unwatched;
-        candidates(places, transitions, &mut Watch::new(None, &mut poll)).unwrap()
+        let watch = &mut Watch::new(None, &mut poll);
+        Candidates::new(places, transitions, watch).and_then(|made| made.all(transitions, watch)).unwrap()
     }
 
     #[test]
@@ -265,7 +294,7 @@ mod tests {
             polls += 1;
             Err(Stop::Cancelled)
         };
-        let stopped = candidates(1000, &transitions, &mut Watch::new(None, &mut poll));
+        let stopped = Candidates::new(1000, &transitions, &mut Watch::new(None, &mut poll)).map(|_| ());
         assert_eq!((stopped, polls), (Err(Stop::Cancelled), 1));
     }
 

@@ -12,6 +12,8 @@
 //! good chance to be a thousand times faster. Where memory becomes short, who stays beside the others gives way, then the
 //! largest search. The rejected alternative, to go by the levels done alone, drops most winners early.
 //!
+//! Most nets are done in the first round in the first order that is made, so the others are made after it, and catch up.
+//!
 //! The candidates come as an order and its reverse. Where the direction matters, it soon shows, and then it is everything;
 //! where it does not, the two are *twins*: the net looks the same from both ends, and one search says what the other
 //! would. Two ways to lay a ring out are twins as well. So where two stand at the same level with as many nodes after two
@@ -23,7 +25,7 @@
 //! a lock, while searches in two orders share nothing but the net.
 
 use super::abreast::abreast;
-use super::order::{Order, candidates};
+use super::order::{Candidates, Order};
 use super::racer::Racer;
 use super::space::Symbolic;
 use super::zdd::Node;
@@ -120,9 +122,11 @@ fn drop_twins(field: &mut Vec<Racer>) {
 
 /// The searches for the markings of one net, each in an order of its own.
 pub(super) struct Race {
-    transitions: Vec<Transition>,
-    initial: Vec<u32>,
+    pub(super) transitions: Vec<Transition>,
+    pub(super) initial: Vec<u32>,
     field: Vec<Racer>,
+    /// What makes the other orders, until those that run without them have not ended in the first round.
+    others: Option<Candidates>,
     /// The results that a search may compute in the next round, and in the first one.
     fuel: u64,
     first: u64,
@@ -145,19 +149,19 @@ impl Race {
         orders: Option<Vec<Order>>,
         watch: &mut Watch<'_>,
     ) -> Result<Self, Stop> {
-        let orders = match orders {
-            Some(orders) => orders,
-            None => candidates(places, &transitions, watch)?,
+        let (orders, others) = match orders {
+            Some(orders) => (orders, None),
+            None => {
+                let made = Candidates::new(places, &transitions, watch)?;
+                (made.first().into(), Some(made))
+            }
         };
-        let mut field: Vec<Racer> = orders.into_iter().map(Racer::new).collect();
-        for at in 0..field.len() {
-            field[at].is_shortest = at == 0 || field[at].is_reverse_of(&field[0]);
-        }
         let first = FUEL + FUEL_PER_LEVEL * places as u64;
-        Ok(Race {
+        let mut race = Race {
             transitions,
             initial,
-            field,
+            field: Vec::new(),
+            others,
             fuel: first,
             first,
             spent: 0,
@@ -165,7 +169,29 @@ impl Race {
             settled: false,
             rounds_settled: 0,
             apart: false,
-        })
+        };
+        race.line_up(orders);
+        Ok(race)
+    }
+
+    /// Makes these orders the field; a search that has begun in one of them has had its turn.
+    fn line_up(&mut self, orders: Vec<Order>) {
+        let mut begun = std::mem::take(&mut self.field);
+        for order in orders {
+            let racer = match begun.iter().position(|racer| racer.order == order) {
+                Some(at) => begun.swap_remove(at),
+                None => Racer { fuel: self.fuel, ..Racer::new(order) },
+            };
+            self.field.push(racer);
+        }
+        for at in 0..self.field.len() {
+            self.field[at].is_shortest = at == 0 || self.field[at].is_reverse_of(&self.field[0]);
+        }
+    }
+
+    /// The net, without the searches.
+    pub(super) fn into_net(self) -> (Vec<Transition>, Vec<u32>) {
+        (self.transitions, self.initial)
     }
 
     /// Whether some drop out by now: most races are over before.
@@ -190,7 +216,7 @@ impl Race {
 
     /// Gives each search what it may compute in this round.
     fn hand_out(&mut self) {
-        let are_last = running(&self.field) <= FINALISTS;
+        let are_last = self.others.is_none() && running(&self.field) <= FINALISTS;
         for (at, racer) in self.field.iter_mut().enumerate() {
             racer.fuel = match racer.spared {
                 true if self.settled && self.rounds_settled < ROUNDS_ALONE => 0,
@@ -246,6 +272,13 @@ impl Race {
             ended = self.by_two(bytes, watch)?;
         }
         if ended.is_none() {
+            ended = self.in_turn(bytes, watch)?;
+        }
+        if ended.is_none()
+            && let Some(others) = self.others.take()
+        {
+            let orders = others.all(&self.transitions, watch)?;
+            self.line_up(orders);
             ended = self.in_turn(bytes, watch)?;
         }
         if let Some((at, reach)) = ended
@@ -438,13 +471,43 @@ mod tests {
             let mut poll = unwatched;
             let watch = &mut Watch::new(None, &mut poll);
             let mut race = Race::new(places, (transitions, initial), None, watch).expect("enough room");
-            let (all, mut found) = (race.field.len(), None);
+            let (mut all, mut found) = (race.field.len(), None);
             while found.is_none() && !race.is_long() {
                 assert_eq!(race.thinned, 0);
                 found = race.round(1 << 30, watch).expect("enough room");
+                all = all.max(race.field.len());
             }
             assert_eq!(found.is_some(), ends);
             assert_eq!((race.thinned, race.field.len() < all), (u32::from(!ends), true));
+        }
+    }
+
+    #[test]
+    fn the_other_orders_are_made_and_run_once_the_first_has_not_ended() {
+        let (places, transitions, initial) = vehicles(4, 16);
+        for (fuel, ends) in [(1 << 24, true), (SLOW, false)] {
+            let mut poll = unwatched;
+            let watch = &mut Watch::new(None, &mut poll);
+            let net = (transitions.clone(), initial.clone());
+            let mut race = Race::new(places, net.clone(), None, watch).expect("enough room");
+            (race.first, race.fuel) = (fuel, fuel);
+            let first: Vec<Order> = race.field.iter().map(|racer| racer.order.clone()).collect();
+            assert_eq!(first.len(), 2);
+            assert_eq!(race.round(1 << 30, watch).map(|found| found.is_some()), Ok(ends));
+            assert_eq!(race.others.is_some(), ends);
+            if ends {
+                continue;
+            }
+            assert!(race.field.len() > 2 && race.field.iter().all(|racer| racer.begun.is_some() && racer.fuel == 0));
+            assert!(race.field[0].is_shortest && race.field[1].is_shortest && !race.field[2].is_shortest);
+            for order in first {
+                // It had one turn, as long as if it had run alone.
+                let mut alone = Race::new(places, net.clone(), Some(vec![order]), watch).expect("enough room");
+                (alone.first, alone.fuel) = (fuel, fuel);
+                assert!(alone.round(1 << 30, watch).is_ok_and(|found| found.is_none()));
+                let here = race.field.iter().find(|racer| racer.order == alone.field[0].order);
+                assert_eq!(here.map(Racer::standing), Some(alone.field[0].standing()));
+            }
         }
     }
 

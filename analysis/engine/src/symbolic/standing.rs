@@ -70,20 +70,27 @@ impl Symbolic {
         orders: Option<Vec<Order>>,
         watch: &mut Watch<'_>,
     ) -> Result<Self, Stop> {
-        let smaller = if orders.is_none() { merged(places, &transitions, &initial, watch)? } else { None };
-        let smaller = smaller.filter(|small| 4 * small.stands.len() <= LEFT_OF_FOUR * places);
-        let net = (transitions.clone(), initial.clone());
-        let mut race = Race::new(places, net, orders, watch)?;
-        let Some(smaller) = smaller else { return race.run(bytes, watch) };
-        while !race.is_long() {
+        let only = orders.is_some();
+        let mut race = Race::new(places, (transitions, initial), orders, watch)?;
+        if only {
+            return race.run(bytes, watch);
+        }
+        let mut short = false;
+        while !race.is_long() && !short {
             match race.round(bytes, watch) {
                 Ok(Some(found)) => return Ok(found),
                 Ok(None) => {}
-                Err(Stop::Memory) => break,
+                Err(Stop::Memory) => short = true,
                 Err(stop) => return Err(stop),
             }
         }
-        drop(race);
+        // Most nets are done by now, sooner than a smaller one is looked for.
+        let smaller = merged(places, &race.transitions, &race.initial, watch)?
+            .filter(|small| 4 * small.stands.len() <= LEFT_OF_FOUR * places);
+        let Some(smaller) = smaller else {
+            return if short { Err(Stop::Memory) } else { race.run(bytes, watch) };
+        };
+        let (transitions, initial) = race.into_net();
         match Self::through(smaller, &transitions, &initial, bytes, watch) {
             Ok(Some(found)) => return Ok(found),
             Ok(None) | Err(Stop::Memory) => {}
