@@ -14,8 +14,10 @@ twenty times a second and says whether the answer is no longer needed. What they
 raises, comes out. An exploration that is ended so is incomplete; any other work raises `BudgetExceeded`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import final
+
+from firable.nets.net import Transition
 
 _Row = tuple[list[int], list[int], list[int], list[int], list[tuple[int, bool]]]
 _Ends = tuple[bytes, bytes]
@@ -26,6 +28,14 @@ class BudgetExceeded(RuntimeError):  # noqa: N818 - what happened is no error of
 
 class IncompleteGraph(RuntimeError):  # noqa: N818 - likewise
     """The answer needs the whole reachability graph, and the exploration ended early."""
+
+def flat(
+    places: Mapping[str, int], signals: Mapping[str, int], transitions: tuple[Transition, ...]
+) -> tuple[_Ends, _Ends, _Ends, _Ends, _Ends]:
+    """The transitions of a net, end to end; `places` and `signals` have the index of each name.
+
+    Raises `KeyError` for a name without an index.
+    """
 
 def explore(
     n_places: int,

@@ -10,13 +10,11 @@ Nothing recurses over the formula: one that a program has built may be deeper th
 
 from __future__ import annotations
 
-from array import array
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from itertools import chain
-from operator import attrgetter
 from typing import Any, Final
 
+from firable.analysis import _engine
 from firable.analysis.deadline import Deadline
 from firable.nets.formula import And, Formula, Not, Or
 from firable.nets.net import Net
@@ -49,23 +47,8 @@ def flat(net: Net) -> tuple[int, Flat, list[int]]:
     >>> n_places, list(memoryview(inputs[1]).cast("I")), list(memoryview(outputs[1]).cast("I")), marked
     (2, [0], [1], [0])
     """
-    place, signal = net.place_index, net.signal_index
-
-    def ends(part: str) -> Ends:
-        sets = list(map(attrgetter(part), net.transitions))
-        return _uint32(map(len, sets)), _uint32(map(place.__getitem__, chain.from_iterable(sets)))
-
-    literals = [transition.external for transition in net.transitions]
-    external = (
-        _uint32(map(len, literals)),
-        _uint32(2 * signal[gate.signal] + gate.wanted for gate in chain.from_iterable(literals)),
-    )
-    transitions = (ends("inputs"), ends("outputs"), ends("permissive"), ends("inhibitive"), external)
+    transitions = _engine.flat(net.place_index, net.signal_index, net.transitions)
     return len(net.places), transitions, [i for i, of in enumerate(net.places) if of.marked]
-
-
-def _uint32(numbers: Iterable[int]) -> bytes:
-    return array("I", numbers).tobytes()
 
 
 def rows(net: Net) -> tuple[int, list[Row], list[int]]:

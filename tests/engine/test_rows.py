@@ -56,6 +56,39 @@ def test_the_diagram_and_the_search_by_stubborn_sets_take_both_forms() -> None:
     assert searches[0] == searches[1]
 
 
+class Made:
+    """A transition whose names are made anew each time that somebody asks for them, and kept by nobody."""
+
+    permissive = inhibitive = external = ()
+
+    def __init__(self, at: int) -> None:
+        self.at = at
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        return (f"place {self.at}",)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        return (f"place {self.at + 1}",)
+
+
+def test_a_name_is_what_it_says_whatever_string_it_is() -> None:
+    index = {f"place {at}": at for at in range(101)}
+    transitions: Any = tuple(Made(at) for at in range(100))
+    inputs, outputs, *_ = _engine.flat(index, {}, transitions)
+    assert list(memoryview(inputs[1]).cast("I")) == list(range(100))
+    assert list(memoryview(outputs[1]).cast("I")) == list(range(1, 101))
+
+
+def test_a_name_without_an_index_is_no_place_and_no_signal() -> None:
+    index = {"p": 0}
+    with pytest.raises(KeyError, match="'q'"):
+        _engine.flat(index, {}, (Transition("t", ("p",), ("q",)),))
+    with pytest.raises(KeyError, match="'s'"):
+        _engine.flat(index, {}, (Transition("t", ("p",), (), external=(ExternalGate("s"),)),))
+
+
 @pytest.mark.parametrize(
     ("parts", "words"),
     [

@@ -103,6 +103,8 @@ mod extension {
     #[pymodule_export]
     use crate::python::local::{Local, evaluate_locally};
     #[pymodule_export]
+    use crate::python::rows::flat;
+    #[pymodule_export]
     use crate::python::stubborn::{Search, Stubborn};
     use crate::python::{BudgetExceeded, IncompleteGraph};
 

@@ -5,10 +5,15 @@
 //! permissive and inhibitive gates in turn, how many places each transition has and which, as bytes of 32-bit numbers.
 //! Rows are for what is written by hand, and for a net with a transition of one's own.
 
+use std::collections::HashMap;
+
+use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
+use pyo3::types::{PyBytes, PyTuple};
 
 use crate::net::{Net, Transition};
+use crate::symbolic::events::Mixed;
 
 /// A transition: inputs, outputs, permissive and inhibitive gate places, external literals.
 type Row = (Vec<u32>, Vec<u32>, Vec<u32>, Vec<u32>, Vec<(u32, bool)>);
@@ -84,4 +89,49 @@ impl<'a> Sets<'a> {
         self.left = left;
         Ok(set.iter().map(|&place| u32::from_ne_bytes(place)).collect())
     }
+}
+
+/// The transitions of a net, flat, read off its objects. See the stub.
+///
+/// A net has one string for each of its names, whoever it joins, so an index is known by where the string is: to look
+/// into the string, the dictionary and the number takes several times as long. Each object is visited once, for most of
+/// the time goes by in waiting for memory.
+#[pyfunction]
+pub(crate) fn flat<'py>(
+    places: &Bound<'py, PyAny>,
+    signals: &Bound<'py, PyAny>,
+    transitions: &Bound<'py, PyTuple>,
+) -> PyResult<[(Bound<'py, PyBytes>, Bound<'py, PyBytes>); 5]> {
+    let py = places.py();
+    let parts = [intern!(py, "inputs"), intern!(py, "outputs"), intern!(py, "permissive"), intern!(py, "inhibitive")];
+    let mut known: HashMap<usize, u32, Mixed> = HashMap::with_capacity_and_hasher(places.len()?, Mixed::default());
+    // A string that is known by where it is must not make room for another one.
+    let mut held = Vec::new();
+    let mut found: [(Vec<u8>, Vec<u8>); 5] = Default::default();
+    for transition in transitions.iter_borrowed() {
+        for ((lengths, ends), part) in found.iter_mut().zip(parts) {
+            let set = transition.getattr(part)?.cast_into::<PyTuple>()?;
+            lengths.extend_from_slice(&(set.len() as u32).to_ne_bytes());
+            for name in set.iter_borrowed() {
+                let at = name.as_ptr() as usize;
+                let number = match known.get(&at) {
+                    Some(&number) => number,
+                    None => *known.entry(at).or_insert(places.get_item(name)?.extract()?),
+                };
+                ends.extend_from_slice(&number.to_ne_bytes());
+            }
+            if !set.is_empty() {
+                held.push(set);
+            }
+        }
+        let [.., (lengths, ends)] = &mut found;
+        let literals = transition.getattr(intern!(py, "external"))?.cast_into::<PyTuple>()?;
+        lengths.extend_from_slice(&(literals.len() as u32).to_ne_bytes());
+        for literal in literals.iter_borrowed() {
+            let signal: u32 = signals.get_item(literal.getattr(intern!(py, "signal"))?)?.extract()?;
+            let wanted = literal.getattr(intern!(py, "wanted"))?.is_truthy()?;
+            ends.extend_from_slice(&(2 * signal + u32::from(wanted)).to_ne_bytes());
+        }
+    }
+    Ok(found.map(|(lengths, ends)| (PyBytes::new(py, &lengths), PyBytes::new(py, &ends))))
 }
