@@ -38,7 +38,7 @@ export PYO3_PYTHON = $(abspath $(BIN)/python)
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo test meanwhile fmt docs page bench bench-instructions campaign simulate explore mutants clean lint lint-python lint-ruff
-.PHONY: lint-format lint-types lint-rust lint-rust-format lint-clippy test-rust test-python
+.PHONY: lint-format lint-types lint-rust lint-rust-format lint-clippy test-rust test-last test-python
 
 help: ## these lines
 	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/:.*##/\t/' | expand -t 20
@@ -46,14 +46,13 @@ help: ## these lines
 demo: $(MADE)/install ## check, prove, bundle and run the one-robot cell, and see another one deadlock
 	@BIN=$(BIN) sh docs/demo.sh
 
-# The type checker works on one processor, and so does the compiler of a crate: side by side they take half as long. The
-# crate is checked and tested while the environment is made, of which the longest is the same crate, optimised as shipped.
-# The tests are compiled there too, once for all workers. What make says to its own children (MAKEFLAGS) is kept from
-# cargo, which takes it for an order to wait for make.
+# The compiler of a crate, the installer and the type checker each leave a processor idle for long, so all goes on side by
+# side: the crate is checked and tested while the environment is made, of which the longest is the same crate, optimised as
+# shipped. The tests begin when they are compiled, once for all workers, and nothing was found that is found soon; types
+# and the crate's own tests go on beside them. What make says to its own children (MAKEFLAGS) is kept from cargo, which takes
+# it for an order to wait for make.
 test: $(MADE)/rust-tools ## lint, format, types, and all tests
-	$(MAKE) --jobs=$(if $(MEANWHILE),3,2) --output-sync=target \
-		$(if $(MEANWHILE),meanwhile) $(MADE)/develop lint-rust test-rust lint-python $(MADE)/collected
-	$(MAKE) test-python
+	$(MAKE) --jobs=$(if $(MEANWHILE),4,3) --output-sync=target $(MADE)/develop test-rust lint test-last
 
 meanwhile:
 	$(MEANWHILE)
@@ -82,8 +81,11 @@ lint-clippy: $(MADE)/rust-tools
 test-rust: $(MADE)/venv
 	MAKEFLAGS= cargo test $(CARGO_OPTIONS) --quiet
 
+test-last: $(if $(MEANWHILE),meanwhile) $(MADE)/collected lint-rust lint-ruff lint-format
+	$(MAKE) --output-sync=none test-python # which tell at once how far they are
+
 test-python: $(MADE)/develop
-	$(BIN)/pytest $(PYTEST_OPTIONS)
+	MAKEFLAGS= $(BIN)/pytest $(PYTEST_OPTIONS)
 
 fmt: $(MADE)/develop $(MADE)/rust-tools ## format all code, and repair what the linter can
 	$(BIN)/ruff check --fix .

@@ -9,7 +9,8 @@ A solver says the same of the same text, so it is asked once in a process: most 
 Whoever runs the tests in the background has Ctrl-C ignored, and so would all processes that the tests start.
 
 Ten thousand collected tests live to the end. The garbage collector is told so, or it looks at them all again and again.
-It looks less often than Python has it do, because most tests build what they need and drop it, with few cycles.
+It looks less often than Python has it do, because most tests build what they need and drop it, with few cycles; and not
+at all while they are collected.
 """
 
 import gc
@@ -25,6 +26,7 @@ from support.examples import FACTOR, FIRST_SEED, IN_CAMPAIGN, IS_REPEATED, examp
 settings.register_profile("firable", examples(100), derandomize=IS_REPEATED)
 settings.load_profile("firable")
 os.environ["FIRABLE_CACHE"] = ""
+gc.disable()
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -45,6 +47,7 @@ def asked_once() -> Iterator[None]:
 def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
+    gc.enable()
     gc.set_threshold(20_000, 20, 50)
 
 

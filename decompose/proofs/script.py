@@ -59,7 +59,7 @@ def block(name: str, statement: str, assertions: tuple[Term, ...]) -> str:
 
 
 class Reader:
-    """z3, reading a file from its beginning, up to its first block; `timeout_ms` is for each answer.
+    """z3, which reads the beginning of a file when it is asked for its first block; `timeout_ms` is for each answer.
 
     Time may end in the midst of any command, a `push` or a `pop` too. What the context holds then is not what the file
     says, so nothing more is believed of it: the block is unknown, and a new context reads the beginning again.
@@ -67,7 +67,7 @@ class Reader:
 
     def __init__(self, timeout_ms: int, beginning: str = f"{LOGIC}\n") -> None:
         self._beginning = f"(set-option :smt.random_seed {SEED})\n{beginning}\n(set-option :timeout {timeout_ms})\n"
-        self._context = self._begun()
+        self._context: z3.Context | None = None
 
     def _begun(self) -> z3.Context:
         context = z3.Context()
@@ -77,6 +77,7 @@ class Reader:
 
     def answer(self, text: str) -> Answer:
         """The answer to a block."""
+        self._context = self._context or self._begun()
         try:
             told: str = z3.Z3_eval_smtlib2_string(self._context.ref(), text)
         except z3.Z3Exception as error:
@@ -86,5 +87,5 @@ class Reader:
             return Answer(said[1])
         if "canceled" not in told:
             raise ScriptError(f"z3 said {said} to\n{text}")
-        self._context = self._begun()
+        self._context = None
         return Answer.UNKNOWN

@@ -347,6 +347,7 @@ def test_nothing_is_believed_of_z3_once_time_ended_within_a_command(
     monkeypatch: pytest.MonkeyPatch, ended: z3.Z3Exception | str
 ) -> None:
     reader = Reader(1000, "(set-logic QF_UF)\n(declare-const p Bool)\n")
+    assert reader.answer(block("a", "so", ())) is Answer.SAT  # the beginning is read by now
     read = z3.Z3_eval_smtlib2_string
 
     def out_of_time(context: object, text: str) -> str:
