@@ -160,6 +160,8 @@ class Host:
             self.taking_up = restart.TakingUp(resume=resume)
         self.was_done = self.journal.kept(TRACE).get(_END) == State.DONE.value
         self.paused = False
+        self.stepping = asyncio.Lock()
+        """Held by whoever makes a single step."""
         self.stopping = False
         self.draining = False
         self.ends_at_home = False

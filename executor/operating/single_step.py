@@ -1,19 +1,22 @@
 """A single step: while a host is paused, one transition fires, and everything stands again.
 
 Local transitions of each controller and the coordinators take turns to be first. Among several hosts a step is of a
-transition that this one decides; its coordinator asks the controllers elsewhere, who answer unless they are paused.
+transition that this one decides; its coordinator asks the controllers elsewhere, who answer unless they are paused. It
+asks when they have said what the last decision came to, so a step that follows at once finds what that has enabled.
+Of two operators who step at once each has a step of his own.
 """
 
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
     from firable.executor.operating.host import Host
 
 VOTES_SECONDS: Final = 2.0
-"""So long a step waits for the votes of other hosts."""
+"""So long a step waits for other hosts: for what they have to say of the last decision, and for their votes."""
 
 
 async def step(run: Host) -> str | None:
@@ -21,30 +24,44 @@ async def step(run: Host) -> str | None:
 
     Whatever else the operator says meanwhile, a stop most of all, ends the step before it fires.
     """
-    await run.quiet()
-    before = dict(run.recorder.firings)
-    names = [*run.coordinators, *run.controllers]
-    for name in names[run.turn :] + names[: run.turn]:
-        if not run.paused or run.stopping or run.is_over or run.peers.is_unmet:
-            return None
-        if name in run.controllers:
-            run.acts.fire(name)
-        else:
-            await _commit_one(run, name)
+    async with run.stepping:
         await run.quiet()
-        fired = [t for t, count in run.recorder.firings.items() if count > before[t]]
-        if fired:
-            run.turn = (names.index(name) + 1) % len(names)
-            return fired[0]
-    return None
+        before = dict(run.recorder.firings)
+        names = [*run.coordinators, *run.controllers]
+        for name in names[run.turn :] + names[: run.turn]:
+            if not _may_step(run):
+                return None
+            if name in run.controllers:
+                run.acts.fire(name)
+            else:
+                await _commit_one(run, name)
+            await run.quiet()
+            fired = [t for t, count in run.recorder.firings.items() if count > before[t]]
+            if fired:
+                run.turn = (names.index(name) + 1) % len(names)
+                return fired[0]
+        return None
+
+
+def _may_step(run: Host) -> bool:
+    return run.paused and not (run.stopping or run.is_over or run.peers.is_unmet)
 
 
 async def _commit_one(run: Host, name: str) -> None:
-    coordinator, loop = run.coordinators[name], asyncio.get_running_loop()
+    coordinator = run.coordinators[name]
+    await _heard(run, lambda: coordinator.idle)
+    if not _may_step(run):
+        return
     run.acts.act(name, coordinator.permit(1))
     await run.quiet()
-    end = loop.time() + VOTES_SECONDS
-    while any(not one.decided for one in coordinator.rounds.values()) and loop.time() < end and not run.is_over:
-        await asyncio.sleep(0.01)  # votes of other hosts are on their way
+    await _heard(run, lambda: all(one.decided for one in coordinator.rounds.values()))
     if run.paused:
         run.acts.act(name, coordinator.permit(0))
+
+
+async def _heard(run: Host, is_so: Callable[[], bool]) -> None:
+    """Wait for what other hosts have to say: it is on its way."""
+    loop = asyncio.get_running_loop()
+    end = loop.time() + VOTES_SECONDS
+    while _may_step(run) and not is_so() and loop.time() < end:
+        await asyncio.sleep(0.01)

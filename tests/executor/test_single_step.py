@@ -1,0 +1,92 @@
+"""Single steps among several hosts, which take a while to hear of each other."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+
+import pytest
+
+from firable.decompose import split
+from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.drivers.dry_run import DryRunDriver
+from firable.executor.journal.journal import MemoryJournal
+from firable.executor.links.in_process import Exchange, InProcessLink
+from firable.executor.links.link import COORDINATOR, Greeting
+from firable.executor.operating.host import Host
+from firable.executor.operating.recorder import Recorder
+from firable.executor.operating.single_step import VOTES_SECONDS
+from firable.executor.protocol.messages import Message
+from firable.nets.text import parse_net
+
+SPLIT = split(
+    parse_net("""\
+firable: 1
+cell: cell
+controllers:
+  a: {start: here, places: {here: , there: }}
+  b: {start: here, places: {here: , there: }}
+transitions:
+  go: {from: [a.here, b.here], to: [a.there, b.there]}
+  come: {from: [a.there, b.there], to: [a.here, b.here]}
+""")
+)
+UNDER_WAY_SECONDS = 0.2
+
+
+class Slow(InProcessLink):
+    """A link whose messages are under way for a while."""
+
+    def send(self, sender: str, receiver: str, message: Message) -> None:
+        asyncio.get_running_loop().call_later(UNDER_WAY_SECONDS, super().send, sender, receiver, message)
+
+
+def paused(operator: Callable[[Host], Awaitable[None]]) -> None:
+    """Let an operator act on the paused host of b and the coordinator, beside the one of a."""
+
+    async def main() -> None:
+        exchange, hosts = Exchange(), []
+        for machines in (("a",), (COORDINATOR, "b")):
+            driver = DryRunDriver([SPLIT.subnet(machines[-1])], 1.0)
+            recorder = Recorder(SPLIT.net, "", None, None, machines)
+            link = Slow(exchange, Greeting("d", machines))
+            hosts.append(Host(SPLIT, driver, recorder, machines=machines, link=link, journal=MemoryJournal()))
+        centre = hosts[1]
+        centre.pause()
+        tasks = [asyncio.create_task(host.main()) for host in hosts]
+        await asyncio.sleep(5)
+        await operator(centre)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks)
+
+    run_in_virtual_time(main())
+
+
+def test_a_step_at_once_after_another_one_finds_what_that_has_enabled() -> None:
+    async def operator(centre: Host) -> None:
+        assert [await centre.step() for _ in range(6)] == ["go", "come"] * 3
+
+    paused(operator)
+
+
+def test_two_who_step_at_once_have_a_step_each() -> None:
+    async def operator(centre: Host) -> None:
+        first, second = await asyncio.gather(centre.step(), centre.step())
+        assert (first, second) == ("go", "come")
+        assert centre.recorder.firings == {"go": 1, "come": 1}
+
+    paused(operator)
+
+
+@pytest.mark.parametrize("after_seconds", [0.0, 0.1, 0.3, 0.5])
+def test_a_stop_ends_a_step_that_waits_for_other_hosts_before_it_fires(after_seconds: float) -> None:
+    async def operator(centre: Host) -> None:
+        assert await centre.step() == "go"
+        began = asyncio.get_running_loop().time()
+        step = asyncio.create_task(centre.step())
+        await asyncio.sleep(after_seconds)
+        centre.stop()
+        assert await step is None
+        assert asyncio.get_running_loop().time() < began + after_seconds + VOTES_SECONDS / 4
+        assert centre.recorder.firings == {"go": 1, "come": 0}
+
+    paused(operator)
