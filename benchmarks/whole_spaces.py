@@ -96,6 +96,7 @@ def _table(words: str, make: Callable[[Net, Limits], StateSpace[Any]], repeat: i
                 break
             seconds.append(took)
             told = _counted(space.until(Deadline.after(SECONDS_MAX)), subject, words)
+            del space  # beside which the next one would have to find room
         goal = ""
         if (wanted_seconds := subject.goal_seconds) is not None:
             met = bool(seconds) and min(seconds) <= wanted_seconds

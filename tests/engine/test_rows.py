@@ -81,6 +81,14 @@ def test_a_name_is_what_it_says_whatever_string_it_is() -> None:
     assert list(memoryview(outputs[1]).cast("I")) == list(range(1, 101))
 
 
+def test_a_net_that_a_program_makes_of_lists_and_sets_is_the_same() -> None:
+    loose: Any = (["p"], {"q"}, ["r"], [], [ExternalGate("s", wanted=False)])
+    strict = Transition("t", ("p",), ("q",), ("r",), (), (ExternalGate("s", wanted=False),))
+    index = {"p": 0, "q": 1, "r": 2}
+    transitions: Any = [Transition("t", *loose)]
+    assert _engine.flat(index, {"s": 0}, transitions) == _engine.flat(index, {"s": 0}, (strict,))
+
+
 def test_a_name_without_an_index_is_no_place_and_no_signal() -> None:
     index = {"p": 0}
     with pytest.raises(KeyError, match="'q'"):

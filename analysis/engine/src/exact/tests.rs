@@ -27,7 +27,7 @@ fn keeps_apart<S: Slot>(bits: u32, keys: &[u64]) {
     assert_eq!(table.len, keys.len());
     assert!(keys.iter().all(|&key| table.has(key)));
     let all: std::collections::HashSet<u64> = keys.iter().copied().collect();
-    assert!((0..1_u64 << bits.min(17)).all(|key: u64| table.has(key) == all.contains(&key)));
+    assert!((0..1_u64 << bits.min(18)).all(|key: u64| table.has(key) == all.contains(&key)));
     let mut missed = 0;
     for part in keys.chunks(ROOM - 1) {
         let mut asked = Asked::new();

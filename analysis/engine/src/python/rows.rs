@@ -91,6 +91,17 @@ impl<'a> Sets<'a> {
     }
 }
 
+/// What there is in an object, as a tuple; a program may have made a list or a set where a net has a tuple.
+fn tuple_of<'py>(object: Bound<'py, PyAny>) -> PyResult<Bound<'py, PyTuple>> {
+    match object.cast_into::<PyTuple>() {
+        Ok(tuple) => Ok(tuple),
+        Err(other) => {
+            let other = other.into_inner();
+            Ok(other.py().get_type::<PyTuple>().call1((other,))?.cast_into()?)
+        }
+    }
+}
+
 /// The transitions of a net, flat, read off its objects. See the stub.
 ///
 /// A net has one string for each of its names, whoever it joins, so an index is known by where the string is: to look
@@ -100,17 +111,17 @@ impl<'a> Sets<'a> {
 pub(crate) fn flat<'py>(
     places: &Bound<'py, PyAny>,
     signals: &Bound<'py, PyAny>,
-    transitions: &Bound<'py, PyTuple>,
+    transitions: Bound<'py, PyAny>,
 ) -> PyResult<[(Bound<'py, PyBytes>, Bound<'py, PyBytes>); 5]> {
     let py = places.py();
     let parts = [intern!(py, "inputs"), intern!(py, "outputs"), intern!(py, "permissive"), intern!(py, "inhibitive")];
     let mut known: HashMap<usize, u32, Mixed> = HashMap::with_capacity_and_hasher(places.len()?, Mixed::default());
-    // A string that is known by where it is must not make room for another one.
+    // A string that is known by where it is must not make room for another one; nor does anybody else run meanwhile.
     let mut held = Vec::new();
     let mut found: [(Vec<u8>, Vec<u8>); 5] = Default::default();
-    for transition in transitions.iter_borrowed() {
+    for transition in tuple_of(transitions)?.iter_borrowed() {
         for ((lengths, ends), part) in found.iter_mut().zip(parts) {
-            let set = transition.getattr(part)?.cast_into::<PyTuple>()?;
+            let set = tuple_of(transition.getattr(part)?)?;
             lengths.extend_from_slice(&(set.len() as u32).to_ne_bytes());
             for name in set.iter_borrowed() {
                 let at = name.as_ptr() as usize;
@@ -125,7 +136,7 @@ pub(crate) fn flat<'py>(
             }
         }
         let [.., (lengths, ends)] = &mut found;
-        let literals = transition.getattr(intern!(py, "external"))?.cast_into::<PyTuple>()?;
+        let literals = tuple_of(transition.getattr(intern!(py, "external"))?)?;
         lengths.extend_from_slice(&(literals.len() as u32).to_ne_bytes());
         for literal in literals.iter_borrowed() {
             let signal: u32 = signals.get_item(literal.getattr(intern!(py, "signal"))?)?.extract()?;

@@ -296,6 +296,16 @@ mod tests {
         };
         let stopped = Candidates::new(1000, &transitions, &mut Watch::new(None, &mut poll)).map(|_| ());
         assert_eq!((stopped, polls), (Err(Stop::Cancelled), 1));
+        for last in 1..4 {
+            let mut polls = 0;
+            let mut poll = |_| {
+                polls += 1;
+                if polls > last { Err(Stop::Cancelled) } else { Ok(()) }
+            };
+            let watch = &mut Watch::often(None, &mut poll);
+            let stopped = Candidates::new(1000, &transitions, watch).and_then(|made| made.all(&transitions, watch));
+            assert_eq!((stopped, polls), (Err(Stop::Cancelled), last + 1));
+        }
     }
 
     fn ring(n: u32) -> Vec<Transition> {

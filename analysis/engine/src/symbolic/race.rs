@@ -12,7 +12,8 @@
 //! good chance to be a thousand times faster. Where memory becomes short, who stays beside the others gives way, then the
 //! largest search. The rejected alternative, to go by the levels done alone, drops most winners early.
 //!
-//! Most nets are done in the first round in the first order that is made, so the others are made after it, and catch up.
+//! Most nets are done in the first round in the first order that is made, so the others are made after it, and catch up:
+//! where another order would have been first by its arcs, it has lost to one that is done in no time.
 //!
 //! The candidates come as an order and its reverse. Where the direction matters, it soon shows, and then it is everything;
 //! where it does not, the two are *twins*: the net looks the same from both ends, and one search says what the other
@@ -277,7 +278,10 @@ impl Race {
         if ended.is_none()
             && let Some(others) = self.others.take()
         {
-            let orders = others.all(&self.transitions, watch)?;
+            let first = others.first();
+            let mut orders = others.all(&self.transitions, watch)?;
+            // One that has given way does not come again.
+            orders.retain(|order| !first.contains(order) || self.field.iter().any(|racer| racer.order == *order));
             self.line_up(orders);
             ended = self.in_turn(bytes, watch)?;
         }
@@ -509,6 +513,18 @@ mod tests {
                 assert_eq!(here.map(Racer::standing), Some(alone.field[0].standing()));
             }
         }
+    }
+
+    #[test]
+    fn who_has_given_way_before_the_other_orders_are_made_does_not_come_again() {
+        let (places, transitions, initial) = vehicles(4, 16);
+        let mut poll = unwatched;
+        let watch = &mut Watch::new(None, &mut poll);
+        let mut race = Race::new(places, (transitions, initial), None, watch).expect("enough room");
+        (race.first, race.fuel) = (SLOW, SLOW);
+        let gone = race.field.remove(1).order;
+        assert!(race.round(1 << 30, watch).is_ok_and(|found| found.is_none()));
+        assert!(race.field.len() > 2 && race.field.iter().all(|racer| racer.order != gone));
     }
 
     /// A race whose rounds are so short that nothing is over in the first of them, gone on with by one thread or two.

@@ -11,7 +11,7 @@ use crate::net::Transition;
 /// A search in one order, which may be left and gone on with.
 pub(super) struct Racer {
     pub(super) order: Order,
-    /// Whether no other order has shorter arcs, but for its reverse.
+    /// Whether no other order that was made has shorter arcs, but for its reverse.
     pub(super) is_shortest: bool,
     /// Whether others run for the first places, and this one beside them.
     pub(super) spared: bool,

@@ -485,6 +485,46 @@ mod tests {
     use crate::budget::unwatched;
     use crate::net::Transition;
 
+    /// Philosophers who may take either fork first; both deadlocks are as many firings away as there are philosophers.
+    fn philosophers(n: u32) -> Symbolic {
+        let place = |i: u32, what: u32| i % n * 5 + what; // thinking, fork, left, right, eating
+        let transitions = (0..n).flat_map(|i| {
+            let (thinks, left, right) = (place(i, 0), place(i, 1), place(i + 1, 1));
+            let takes = [(thinks, left, 2), (thinks, right, 3), (place(i, 2), right, 4), (place(i, 3), left, 4)]
+                .map(|(from, fork, what)| Transition::new(&[from, fork], &[place(i, what)], &[], &[], &[]));
+            takes.into_iter().chain([Transition::new(&[place(i, 4)], &[thinks, left, right], &[], &[], &[])])
+        });
+        let initial = (0..n).flat_map(|i| [place(i, 0), place(i, 1)]).collect();
+        let (mut poll, transitions) = (unwatched, transitions.collect());
+        let watch = &mut Watch::new(None, &mut poll);
+        Symbolic::explore(5 * n as usize, transitions, initial, 1 << 24, None, watch).expect("enough room")
+    }
+
+    #[test]
+    fn a_way_that_took_a_search_of_its_own_is_short_and_shows_no_target_that_it_does_not_lead_into() {
+        let (mut space, mut poll) = (philosophers(60), unwatched);
+        space.layers_work = LAYERS_WORK_LEAST; // in which so many layers are not found
+        let watch = &mut Watch::new(None, &mut poll);
+        let reach = space.reach;
+        let alive = space.all(&[], reach, Events::Tests, watch).expect("enough room");
+        let deadlocks = space.binary(&[], Binary::Difference, reach, alive, watch).expect("enough room");
+        let mut walk_to = |targets: Node| {
+            let walk = space.walk_to(&[deadlocks, targets], targets, watch).expect("enough room");
+            let walk = walk.expect("there are deadlocks");
+            let reached = space.single(&[deadlocks], &walk.reached).expect("enough room");
+            let held = [deadlocks, reached];
+            let others = space.binary(&held, Binary::Difference, deadlocks, reached, watch).expect("enough room");
+            (walk, others)
+        };
+        // A run that is drawn goes through many meals: it is aimed at where that has led.
+        let (walk, _) = walk_to(deadlocks);
+        assert_eq!((walk.firings.len(), walk.shortest), (60, false));
+        let (again, other) = walk_to(deadlocks);
+        assert_eq!(again, walk);
+        let (away, _) = walk_to(other);
+        assert!(away.firings.len() < 75 && away.reached != walk.reached);
+    }
+
     #[test]
     fn firings_at_random_come_to_the_deadlock_that_is_wanted_and_to_no_other() {
         // A ring of two places with two ways out of it, of which one is easier to take.
