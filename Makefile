@@ -57,7 +57,7 @@ test: $(MADE)/rust-tools ## lint, format, types, and all tests
 meanwhile:
 	$(MEANWHILE)
 
-lint: lint-python lint-rust ## what `make test` checks before it tests
+lint: lint-python lint-rust ## what `make test` checks besides the tests
 
 lint-python: lint-ruff lint-format lint-types
 

@@ -26,7 +26,6 @@ from support.examples import FACTOR, FIRST_SEED, IN_CAMPAIGN, IS_REPEATED, examp
 settings.register_profile("firable", examples(100), derandomize=IS_REPEATED)
 settings.load_profile("firable")
 os.environ["FIRABLE_CACHE"] = ""
-gc.disable()
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -42,6 +41,10 @@ def asked_once() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(checking, "SOLVERS", {"cvc5": answered, "z3": lru_cache(512)(by_z3)})
         yield
+
+
+def pytest_collectstart() -> None:
+    gc.disable()
 
 
 def pytest_collection_finish() -> None:

@@ -23,12 +23,12 @@ FIRST_SEED = int(os.environ.get("FIRABLE_SEED", "0"))
 
 IN_CAMPAIGN = FACTOR > 1
 IS_REPEATED = bool(os.environ.get("CI")) and not IN_CAMPAIGN
-"""Whether the examples of a property are the same each time, so that half of them will do."""
+"""Whether the examples of a property are the same each time, so that a third of them will do."""
 
 
 def examples(count: int) -> settings:
-    """So many examples of a property in a test run, half of them where `CI` is set, many times more in a campaign."""
-    return settings(max_examples=count * FACTOR // (2 if IS_REPEATED else 1), deadline=None)
+    """So many examples of a property in a test run, a third where `CI` is set, many times more in a campaign."""
+    return settings(max_examples=-(-count * FACTOR // (3 if IS_REPEATED else 1)), deadline=None)
 
 
 def seeds(count: int, part: int = 0) -> range:
