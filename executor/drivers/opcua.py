@@ -1,9 +1,11 @@
 """OPC UA, by asyncua.
 
-Points are node ids, such as `ns=2;s=Robot.Done` or `ns=3;i=1001`. The server tells of changes by a subscription with a
-queue for each node, so that edges between two of its messages are counted; a value whose status is not good is no
-value. What is written takes the type that its node has. Of several writes the last, which is the number of a command,
-goes out when the others are confirmed, because a server may take those of one request in any order.
+Points are node ids, such as `ns=2;s=Robot.Done` or `ns=3;i=1001`, each in the one spelling that it has: points are
+compared as they are written, and `ns=2;i=05` would be the node of `ns=2;i=5`, and look like another. The server tells
+of changes by a subscription with a queue for each node, so that edges between two of its messages are counted; a value
+whose status is not good is no value. What is written takes the type that its node has. Of several writes the last,
+which is the number of a command, goes out when the others are confirmed, because a server may take those of one
+request in any order.
 
 A client that has lost its connection is not repaired: asyncua can reconnect by itself, and would then bring back
 subscriptions with what was queued in the meantime. A new client begins with what the nodes hold now.
@@ -12,11 +14,14 @@ subscriptions with what was queued in the meantime. A new client begins with wha
 from __future__ import annotations
 
 import asyncio
+import re
+from base64 import b64decode, b64encode
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
+from uuid import UUID
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -211,6 +216,36 @@ def _typed(value: Value, kind: Any) -> Value:
             return int(value)
 
 
+_NODE: Final = re.compile(r"(?:ns=([0-9]{1,9});)?([isgb])=([^\x00-\x1f\x7f]+)")
+_NAMESPACE_MAX: Final = 0xFFFF
+_NUMBER_MAX: Final = 0xFFFF_FFFF
+
+
+def spelling(point: Point) -> Point | None:
+    """The one spelling of a node id (OPC UA, Part 6, 5.3.1.10); None for what is none.
+
+    >>> spelling("ns=02;i=0005"), spelling("ns=0;s=Motor; left"), spelling("i=x")
+    ('ns=2;i=5', 's=Motor; left', None)
+    """
+    found = _NODE.fullmatch(point)
+    if found is None:
+        return None
+    namespace, kind, name = int(found[1] or 0), found[2], found[3]
+    try:
+        match kind:
+            case "i":
+                name = str(int(name)) if name.isascii() and name.isdecimal() and int(name) <= _NUMBER_MAX else ""
+            case "g":
+                name = str(UUID(name))
+            case "b":
+                name = b64encode(b64decode(name, validate=True)).decode()
+    except ValueError:
+        return None
+    if namespace > _NAMESPACE_MAX or not name:
+        return None
+    return f"ns={namespace};{kind}={name}" if namespace else f"{kind}={name}"
+
+
 class OpcUa:
     """OPC UA servers."""
 
@@ -219,13 +254,10 @@ class OpcUa:
 
     def point_problem(self, point: Point, use: Use) -> str:
         """What is wrong with a node id; what may be written only the server knows."""
-        parts = dict(part.partition("=")[::2] for part in point.split(";"))
-        kinds = set(parts) - {"ns"}
-        if len(kinds) != 1 or not kinds <= {"i", "s", "g", "b"} or not parts.get("ns", "0").isdecimal():
+        one = spelling(point)
+        if one is None:
             return f"a node to {use} has an id such as `ns=2;s=Robot.Done` or `ns=3;i=1001`"
-        if "i" in kinds and not parts["i"].isdecimal():
-            return "what stands after `i=` is a number"
-        return ""
+        return "" if one == point else f"the node to {use} is written `{one}`, so that two of them can be told apart"
 
     def load(self) -> None:
         """Import what is needed."""

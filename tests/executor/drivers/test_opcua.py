@@ -9,10 +9,10 @@ import pytest
 
 from firable.executor.drivers.bench import Far
 from firable.executor.drivers.conformance import DriverConformance
-from firable.executor.drivers.device import LinkError, Wanted
+from firable.executor.drivers.device import LinkError, Use, Wanted
 from firable.executor.drivers.far_side.machine import ROLES
 from firable.executor.drivers.far_side.opcua_server import OpcUaEnd
-from firable.executor.drivers.opcua import KIND, OpcUaOptions
+from firable.executor.drivers.opcua import KIND, OpcUaOptions, spelling
 
 POINTS = {role: f"ns=2;s=M.{role}" for role in (*ROLES, "number")}
 BITS = {"sensor", "closed", "button", "tripped", "output"}
@@ -65,3 +65,40 @@ def test_a_server_that_takes_a_connection_and_says_nothing_has_not_answered_in_t
         silent.close()
 
     asyncio.run(main())
+
+
+GUID = "c496578a-0dfe-4b8f-870a-745238c6aeae"
+
+
+@pytest.mark.parametrize(
+    ("point", "one"),
+    [
+        *((one, one) for one in ("i=85", "i=0", "ns=2;i=4294967295", "s=a;b=c", f"g={GUID}", "b=AQ==")),
+        *(("ns=0;i=85", "i=85"), ("ns=02;i=5", "ns=2;i=5"), ("ns=2;i=05", "ns=2;i=5"), ("ns=00;s= a", "s= a")),
+        *((f"ns=1;g={{{GUID.upper()}}}", f"ns=1;g={GUID}"), ("ns=3;b=AR==", "ns=3;b=AQ==")),
+    ],
+)  # fmt: skip
+def test_a_node_has_one_spelling(point: str, one: str) -> None:
+    from asyncua import ua
+
+    assert spelling(point) == spelling(one) == one
+    problem = KIND.point_problem(point, Use.READ)
+    assert problem == (
+        "" if point == one else f"the node to {Use.READ} is written `{one}`, so that two of them can be told apart"
+    )
+    if "{" not in point:  # which no server has
+        assert ua.NodeId.from_string(point) == ua.NodeId.from_string(one)
+    if ";b=" not in point and not point.startswith("b="):
+        assert ua.NodeId.from_string(one).to_string() == one
+
+
+@pytest.mark.parametrize(
+    "point",
+    [
+        *("", "i=", "i=x", "i=-1", "i=+1", "i=1_0", "i= 5", "i=\u0665", "i=4294967296", "i=5;ns=2", "ns=2", "x=5"),
+        *("ns=65536;i=1", "ns=-1;i=1", "ns=2;ns=3;i=5", "ns=;i=5", "srv=1;i=5", "s=a\nb", "g=1", "b=A", "b=A Q=="),
+    ],
+)
+def test_what_is_no_node_is_refused(point: str) -> None:
+    assert spelling(point) is None
+    assert "has an id such as" in KIND.point_problem(point, Use.READ)
