@@ -44,6 +44,18 @@ def is_host(text: str) -> bool:
     return True
 
 
+def one_name(host: str) -> str:
+    """The one name of a host, which is the same in small letters and without the dot of a whole name.
+
+    >>> one_name("PLC.cell."), one_name("FE80::0001%eth0")
+    ('plc.cell', 'fe80::1%eth0')
+    """
+    try:
+        return str(ip_address(host))
+    except ValueError:
+        return host.lower().removesuffix(".")
+
+
 def _host(text: str) -> str:
     if is_host(text):
         return text

@@ -85,6 +85,10 @@ class Options(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
+    def far_end(self) -> object:
+        """What is equal of two devices that are one, however each is spoken with; by default all options."""
+        return self
+
 
 def files_of(options: BaseModel) -> Iterator[tuple[tuple[str, ...], Beside]]:
     """The files that options name, with the keys that name them.

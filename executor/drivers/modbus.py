@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, cast
 
 from pydantic import Field
 
-from firable.executor.drivers.addresses import HostName, LinePath
+from firable.executor.drivers.addresses import HostName, LinePath, one_name
 from firable.executor.drivers.device import (
     Connection,
     LinkError,
@@ -44,6 +44,10 @@ class TcpOptions(Options):
     unit: int = Field(default=1, ge=0, le=255)
     every_s: float = Field(default=0.01, ge=0, le=60, allow_inf_nan=False)
 
+    def far_end(self) -> object:
+        """A unit behind an address."""
+        return one_name(self.host), self.port, self.unit
+
 
 class RtuOptions(Options):
     """A device on a serial line."""
@@ -54,6 +58,10 @@ class RtuOptions(Options):
     stop_bits: Literal["1", "2"] = "1"
     unit: int = Field(default=1, ge=1, le=247)
     every_s: float = Field(default=0.02, ge=0, le=60, allow_inf_nan=False)
+
+    def far_end(self) -> object:
+        """A unit on a line."""
+        return self.port, self.unit
 
 
 class _Modbus:

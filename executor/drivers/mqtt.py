@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from firable.executor.drivers.addresses import HostName
+from firable.executor.drivers.addresses import HostName, one_name
 from firable.executor.drivers.device import (
     DROPPING,
     Connection,
@@ -72,6 +72,10 @@ class MqttOptions(Options):
     user: str | None = None
     password: Password = None
     tls: bool | MqttTls = False
+
+    def far_end(self) -> object:
+        """The broker, whoever asks it for what: topics are everybody's."""
+        return one_name(self.host), self.port
 
 
 class Guarded:

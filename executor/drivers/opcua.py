@@ -21,11 +21,12 @@ from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
+from urllib.parse import urlsplit
 from uuid import UUID
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from firable.executor.drivers.addresses import OpcUaUrl
+from firable.executor.drivers.addresses import OpcUaUrl, one_name
 from firable.executor.drivers.cancelling import ended
 from firable.executor.drivers.device import (
     Connection,
@@ -80,6 +81,11 @@ class OpcUaOptions(Options):
     user: str | None = None
     password: Password = None
     security: OpcUaSecurity | None = None
+
+    def far_end(self) -> object:
+        """The server at an address; what stands behind that only chooses among the ways to speak with it."""
+        parts = urlsplit(self.url)
+        return one_name(str(parts.hostname)), parts.port
 
 
 class OpcUaConnection(Stepwise):

@@ -53,6 +53,10 @@ class SerialOptions(Options):
     baud: int = Field(default=115_200, ge=300, le=4_000_000)
     every_s: float = Field(default=1.0, gt=0, le=60, allow_inf_nan=False)
 
+    def far_end(self) -> object:
+        """What stands at the end of a line."""
+        return self.port
+
 
 def framed(text: str) -> bytes:
     """A line as it goes over the wire.

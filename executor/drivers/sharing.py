@@ -78,8 +78,9 @@ def _written_elsewhere(
     devices = binding.document.devices
     if not of_devices[name].issubset(here):
         return
+    ends = {device: options.far_end() for device, options in binding.options.items()}
     for other, of in of_devices.items():
-        same = (devices[other].driver, binding.options[other]) == (devices[name].driver, binding.options[name])
+        same = devices[other].driver == devices[name].driver and ends[other] == ends[name]
         both = sorted(_written(devices[name]) & _written(devices[other])) if same and of.isdisjoint(here) else []
         if both:
             points = " and ".join(f"'{point}'" for point in both)

@@ -51,6 +51,10 @@ class SimulatedOptions(Options):
     shows: Mapping[str, Bit] = Field(default_factory=dict)
     effects: Mapping[str, Effect] = Field(default_factory=dict)
 
+    def far_end(self) -> object:
+        """Each simulated device is one of its own."""
+        return object()
+
 
 class SimulatedConnection:
     """The machines of a device, and the one connection that there is to them."""

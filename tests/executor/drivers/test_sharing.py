@@ -11,6 +11,7 @@ from firable.cli.main import main
 from firable.decompose.splitting.cut import split
 from firable.executor.drivers.binding import Binding, parse_binding
 from firable.executor.drivers.bound import BoundDriver, bound_driver
+from firable.executor.drivers.device import Options
 from firable.executor.drivers.far_side.ends import binding_text
 from firable.executor.operating.hosting import own_net
 from firable.nets.catalogue import catalogue_path
@@ -150,6 +151,42 @@ def test_two_devices_at_one_address_do_not_write_the_same(shared: str) -> None:
     elsewhere = apart.replace(f"right: {{{plc}", "right: {driver: modbus-tcp, host: 10.0.0.9")
     assert set(bound_driver(parse_binding(elsewhere), TWO, part).devices) == {"left", "door"}
     assert set(bound_driver(parse_binding(apart), TWO, own_net(split(TWO), ["a", "b"])).devices) > {"left", "right"}
+
+
+def options(driver: str, text: str) -> Options:
+    return parse_binding(f"firable_bind: 1\ncell: c\ndevices: {{d: {{driver: {driver}, {text}}}}}\n").options["d"]
+
+
+@pytest.mark.parametrize(
+    ("driver", "one", "same", "other"),
+    [
+        ("modbus-tcp", "host: plc.cell", "host: PLC.cell., every_s: 1", "host: plc.cell, unit: 2"),
+        ("modbus-tcp", "host: 'fe80::1', port: 502", "host: 'FE80:0::1'", "host: 'fe80::1', port: 503"),
+        ("modbus-rtu", "port: /dev/ttyS0", "port: /dev/ttyS0, baud: 9600", "port: /dev/ttyS1"),
+        ("opcua", "url: opc.tcp://plc:4840", "url: opc.tcp://PLC:4840/, every_s: 1", "url: opc.tcp://plc:4841"),
+        ("mqtt", "host: broker", "host: Broker, user: firable", "host: broker, port: 1884"),
+        ("serial", "port: /dev/ttyS0", "port: /dev/ttyS0, every_s: 2", "port: /dev/ttyS1"),
+    ],
+)
+def test_a_device_is_the_same_however_it_is_spoken_with(driver: str, one: str, same: str, other: str) -> None:
+    assert options(driver, one).far_end() == options(driver, same).far_end()
+    assert options(driver, one).far_end() != options(driver, other).far_end()
+
+
+def test_simulated_devices_are_never_one() -> None:
+    assert options("simulated", "seconds: 1").far_end() != options("simulated", "seconds: 1").far_end()
+
+
+def test_two_devices_at_one_address_are_seen_where_that_is_written_in_another_way() -> None:
+    plc = "driver: modbus-tcp, host: 10.0.0.1"
+    text = BINDING.replace(
+        f"  plc: {{{plc}, channels: {{L: {{number: holding 1}}, M: {{number: holding 2}}}}}}",
+        f"  left: {{{plc}, safe: {{coil 1: true}}, channels: {{L: {{number: holding 1}}}}}}\n"
+        f"  right: {{{plc}, every_s: 0.5, safe: {{coil 1: true}}, channels: {{M: {{number: holding 2}}}}}}",
+    ).replace("{device: plc, channel: L}", "{device: left, channel: L}")
+    text = text.replace("{device: plc, channel: M}", "{device: right, channel: M}")
+    ((code, subject, _),) = refused(parse_binding(text), TWO, own_net(split(TWO), ["a"]))
+    assert (code, subject) == ("F5105", ("devices", "left"))
 
 
 def test_a_host_that_would_share_a_device_is_refused_before_anything_is_connected(
