@@ -243,8 +243,10 @@ def spelling(point: Point) -> Point | None:
                 name = str(int(name)) if name.isascii() and name.isdecimal() and int(name) <= _NUMBER_MAX else ""
             case "g":
                 name = str(UUID(name))
-            case "b":
+            case "b" if not name.startswith("0x"):  # which asyncua reads as hexadecimal
                 name = b64encode(b64decode(name, validate=True)).decode()
+            case "b":
+                return None
     except ValueError:
         return None
     if namespace > _NAMESPACE_MAX or not name:
@@ -263,7 +265,7 @@ class OpcUa:
         one = spelling(point)
         if one is None:
             return f"a node to {use} has an id such as `ns=2;s=Robot.Done` or `ns=3;i=1001`"
-        return "" if one == point else f"the node to {use} is written `{one}`, so that two of them can be told apart"
+        return "" if one == point else f"each node has one spelling, so that two can be told apart: write `{one}`"
 
     def load(self) -> None:
         """Import what is needed."""

@@ -19,8 +19,8 @@ Each command is a line of the trace, with the name of who gave it.
 
 This is no safety function: an emergency stop over a network is a convenience beside the one that is wired.
 
-`aiohttp` serves inside the event loop of the run, so a command is one act like any other and needs no lock. Rejected:
-a server process of its own (uvicorn), which takes the signals of the process, Ctrl-C first.
+`aiohttp` serves inside the event loop of the run, so a command is one act like any other and needs no lock, but for a
+step. Rejected: a server process of its own (uvicorn), which takes the signals of the process, Ctrl-C first.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from firable.executor.operating.host import Host
 
 VOTES_SECONDS: Final = 2.0
-"""So long a step waits for other hosts: for what they have to say of the last decision, and for their votes."""
+"""So long a step waits for other hosts: for what the last decision came to, and for the votes of each coordinator."""
 
 
 async def step(run: Host) -> str | None:
@@ -26,6 +26,8 @@ async def step(run: Host) -> str | None:
     """
     async with run.stepping:
         await run.quiet()
+        # What any coordinator has decided may enable what another one decides.
+        await _heard(run, lambda: all(one.idle for one in run.coordinators.values()))
         before = dict(run.recorder.firings)
         names = [*run.coordinators, *run.controllers]
         for name in names[run.turn :] + names[: run.turn]:
@@ -49,14 +51,13 @@ def _may_step(run: Host) -> bool:
 
 async def _commit_one(run: Host, name: str) -> None:
     coordinator = run.coordinators[name]
-    await _heard(run, lambda: coordinator.idle)
-    if not _may_step(run):
-        return
     run.acts.act(name, coordinator.permit(1))
-    await run.quiet()
-    await _heard(run, lambda: all(one.decided for one in coordinator.rounds.values()))
-    if run.paused:
-        run.acts.act(name, coordinator.permit(0))
+    try:
+        await run.quiet()
+        await _heard(run, lambda: all(one.decided for one in coordinator.rounds.values()))
+    finally:
+        if run.paused and not run.is_over:
+            run.acts.act(name, coordinator.permit(0))
 
 
 async def _heard(run: Host, is_so: Callable[[], bool]) -> None:

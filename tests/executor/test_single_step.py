@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 
 import pytest
+from support.layered_nets import shared_robot
 
 from firable.decompose import split
 from firable.executor.cell.virtual_time import run_in_virtual_time
@@ -14,7 +15,9 @@ from firable.executor.links.link import COORDINATOR, Greeting
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.single_step import VOTES_SECONDS
+from firable.executor.protocol.deciders import coordinator_at
 from firable.executor.protocol.messages import Message
+from firable.nets.decomposition import Decomposition
 from firable.nets.text import parse_net
 
 SPLIT = split(
@@ -39,17 +42,25 @@ class Slow(InProcessLink):
         asyncio.get_running_loop().call_later(UNDER_WAY_SECONDS, super().send, sender, receiver, message)
 
 
-def paused(operator: Callable[[Host], Awaitable[None]]) -> None:
-    """Let an operator act on the paused host of b and the coordinator, beside the one of a."""
+Machines = tuple[str, ...]
+TWO: tuple[Machines, ...] = ((COORDINATOR, "b"), ("a",))
+
+
+def paused(
+    operator: Callable[[Host], Awaitable[None]],
+    decomposition: Decomposition = SPLIT,
+    of: tuple[Machines, ...] = TWO,
+) -> None:
+    """Let an operator act on the first host, which is paused, beside the others."""
 
     async def main() -> None:
         exchange, hosts = Exchange(), []
-        for machines in (("a",), (COORDINATOR, "b")):
-            driver = DryRunDriver([SPLIT.subnet(machines[-1])], 1.0)
-            recorder = Recorder(SPLIT.net, "", None, None, machines)
+        for machines in of:
+            driver = DryRunDriver([subnet for subnet in decomposition.subnets if subnet.name in machines], 1.0)
+            recorder = Recorder(decomposition.net, "", None, None, machines)
             link = Slow(exchange, Greeting("d", machines))
-            hosts.append(Host(SPLIT, driver, recorder, machines=machines, link=link, journal=MemoryJournal()))
-        centre = hosts[1]
+            hosts.append(Host(decomposition, driver, recorder, machines=machines, link=link, journal=MemoryJournal()))
+        centre = hosts[0]
         centre.pause()
         tasks = [asyncio.create_task(host.main()) for host in hosts]
         await asyncio.sleep(5)
@@ -66,6 +77,13 @@ def test_a_step_at_once_after_another_one_finds_what_that_has_enabled() -> None:
         assert [await centre.step() for _ in range(6)] == ["go", "come"] * 3
 
     paused(operator)
+
+
+def test_what_one_coordinator_has_decided_enables_what_another_one_decides_at_once() -> None:
+    async def operator(centre: Host) -> None:
+        assert [await centre.step() for _ in range(4)] == ["fill", "fetch", "back", None]
+
+    paused(operator, split(shared_robot()), ((COORDINATOR, coordinator_at("cell"), "x"), ("r",), ("m",)))
 
 
 def test_two_who_step_at_once_have_a_step_each() -> None:

@@ -82,10 +82,8 @@ def test_a_node_has_one_spelling(point: str, one: str) -> None:
     from asyncua import ua
 
     assert spelling(point) == spelling(one) == one
-    problem = KIND.point_problem(point, Use.READ)
-    assert problem == (
-        "" if point == one else f"the node to {Use.READ} is written `{one}`, so that two of them can be told apart"
-    )
+    told = f"each node has one spelling, so that two can be told apart: write `{one}`"
+    assert KIND.point_problem(point, Use.READ) == ("" if point == one else told)
     if "{" not in point:  # which no server has
         assert ua.NodeId.from_string(point) == ua.NodeId.from_string(one)
     if ";b=" not in point and not point.startswith("b="):
@@ -96,7 +94,18 @@ def test_a_node_has_one_spelling(point: str, one: str) -> None:
     "point",
     [
         *("", "i=", "i=x", "i=-1", "i=+1", "i=1_0", "i= 5", "i=\u0665", "i=4294967296", "i=5;ns=2", "ns=2", "x=5"),
-        *("ns=65536;i=1", "ns=-1;i=1", "ns=2;ns=3;i=5", "ns=;i=5", "srv=1;i=5", "s=a\nb", "g=1", "b=A", "b=A Q=="),
+        *(
+            "ns=65536;i=1",
+            "ns=-1;i=1",
+            "ns=2;ns=3;i=5",
+            "ns=;i=5",
+            "srv=1;i=5",
+            "s=a\nb",
+            "g=1",
+            "b=A",
+            "b=A Q==",
+            "b=0xAB",
+        ),
     ],
 )
 def test_what_is_no_node_is_refused(point: str) -> None:
