@@ -135,20 +135,26 @@ def test_what_stands_behind_a_contact_alone_stops_all_machines_and_is_no_single_
     assert together.devices["relay"].document.safe == {"coil 1": "false"}
 
 
+def two_devices(left: str, right: str) -> str:
+    """The binding where each machine has a device of its own, with these keys beside its channel."""
+    one = "{driver: modbus-tcp, host: 10.0.0.1, channels: {L: {number: holding 1}, M: {number: holding 2}}}"
+    two = f"  left: {{{left}, channels: {{L: {{number: holding 1}}}}}}\n"
+    two += f"  right: {{{right}, channels: {{M: {{number: holding 2}}}}}}"
+    text = BINDING.replace(f"  plc: {one}", two).replace("plc, channel: L", "left, channel: L")
+    return text.replace("plc, channel: M", "right, channel: M")
+
+
+PLC = "driver: modbus-tcp, host: 10.0.0.1"
+
+
+@pytest.mark.parametrize("way", [PLC, f"{PLC}, port: 502, every_s: 0.5"], ids=["same", "other keys"])
 @pytest.mark.parametrize("shared", ["safe: {coil 1: true}", "heartbeat: {write: holding 7, every_s: 0.2}"])
-def test_two_devices_at_one_address_do_not_write_the_same(shared: str) -> None:
-    plc = "driver: modbus-tcp, host: 10.0.0.1"
-    apart = BINDING.replace(
-        f"  plc: {{{plc}, channels: {{L: {{number: holding 1}}, M: {{number: holding 2}}}}}}",
-        f"  left: {{{plc}, {shared}, channels: {{L: {{number: holding 1}}}}}}\n"
-        f"  right: {{{plc}, {shared}, channels: {{M: {{number: holding 2}}}}}}",
-    ).replace("{device: plc, channel: L}", "{device: left, channel: L}")
-    apart = apart.replace("{device: plc, channel: M}", "{device: right, channel: M}")
-    part = own_net(split(TWO), ["a"])
+def test_two_devices_at_one_address_do_not_write_the_same(shared: str, way: str) -> None:
+    apart, part = two_devices(f"{PLC}, {shared}", f"{way}, {shared}"), own_net(split(TWO), ["a"])
     ((code, subject, message),) = refused(parse_binding(apart), TWO, part)
     assert (code, subject) == ("F5105", ("devices", "left"))
     assert "as 'right' does, which is another host's at the same address" in message
-    elsewhere = apart.replace(f"right: {{{plc}", "right: {driver: modbus-tcp, host: 10.0.0.9")
+    elsewhere = two_devices(f"{PLC}, {shared}", f"driver: modbus-tcp, host: 10.0.0.9, {shared}")
     assert set(bound_driver(parse_binding(elsewhere), TWO, part).devices) == {"left", "door"}
     assert set(bound_driver(parse_binding(apart), TWO, own_net(split(TWO), ["a", "b"])).devices) > {"left", "right"}
 
@@ -175,18 +181,6 @@ def test_a_device_is_the_same_however_it_is_spoken_with(driver: str, one: str, s
 
 def test_simulated_devices_are_never_one() -> None:
     assert options("simulated", "seconds: 1").far_end() != options("simulated", "seconds: 1").far_end()
-
-
-def test_two_devices_at_one_address_are_seen_where_that_is_written_in_another_way() -> None:
-    plc = "driver: modbus-tcp, host: 10.0.0.1"
-    text = BINDING.replace(
-        f"  plc: {{{plc}, channels: {{L: {{number: holding 1}}, M: {{number: holding 2}}}}}}",
-        f"  left: {{{plc}, safe: {{coil 1: true}}, channels: {{L: {{number: holding 1}}}}}}\n"
-        f"  right: {{{plc}, every_s: 0.5, safe: {{coil 1: true}}, channels: {{M: {{number: holding 2}}}}}}",
-    ).replace("{device: plc, channel: L}", "{device: left, channel: L}")
-    text = text.replace("{device: plc, channel: M}", "{device: right, channel: M}")
-    ((code, subject, _),) = refused(parse_binding(text), TWO, own_net(split(TWO), ["a"]))
-    assert (code, subject) == ("F5105", ("devices", "left"))
 
 
 def test_a_host_that_would_share_a_device_is_refused_before_anything_is_connected(
