@@ -36,6 +36,7 @@ mod saturation;
 pub mod space;
 mod spectral;
 mod standing;
+mod thinning;
 mod trial;
 mod values;
 pub mod walk;

@@ -1,24 +1,14 @@
 //! The race of orders: the reachable markings in whichever order of places finds them first.
 //!
-//! Which order of places is good shows only in the search, and late: on nets of the model-checking contest the winner is
-//! as often the one with the most nodes after the first rounds as the one with the fewest. So the candidates race: each
-//! computes some results, then the next one, and in the next round twice as many; all are kept for some rounds, which
-//! ends the race on most nets, then half drop out of each, until two are left, of which the second gets less. Which of
-//! them is the first is said once: to change it whenever the other seems to get on better means to pay for both. The
-//! order that the net came in is spared for some rounds beside these, as what its author knew shows in no measure. The
-//! one with the shortest arcs, from either end, stays to the end: on a chain of parts every search seems to be nearly
-//! done all the time, and nothing else tells that it is the one that will be. A saturation has its own stack and can be
-//! left and gone on with, so nothing is done twice, and the race costs some times the search of the winner, against a
-//! good chance to be a thousand times faster. Where memory becomes short, who stays beside the others gives way, then the
-//! largest search. The rejected alternative, to go by the levels done alone, drops most winners early.
+//! Which order of places is good shows only in the search, and late. So the candidates race: each computes some results,
+//! then the next one, and in the next round twice as many; all are kept for some rounds, which ends the race on most nets,
+//! then some drop out of each (`thinning`), until two are left, of which the second gets less, and those that stay beside
+//! them. A saturation has its own stack and can be left and gone on with, so nothing is done twice, and the race costs
+//! some times the search of the winner, against a good chance to be a thousand times faster. Where memory becomes short,
+//! who stays beside the others gives way, then the largest search.
 //!
 //! Most nets are done in the first round in the first order that is made, so the others are made after it, and catch up:
 //! where another order would have been first by its arcs, it has lost to one that is done in no time.
-//!
-//! The candidates come as an order and its reverse. Where the direction matters, it soon shows, and then it is everything;
-//! where it does not, the two are *twins*: the net looks the same from both ends, and one search says what the other
-//! would. Two ways to lay a ring out are twins as well. So where two stand at the same level with as many nodes after two
-//! rounds in succession, the second drops out.
 //!
 //! Where a second processor is free, two searches run at a time from the second round on: most nets are done in the
 //! first, sooner than a thread begins. A round is the same as if they had run in turn: of those that end in it the first
@@ -29,6 +19,7 @@ use super::abreast::abreast;
 use super::order::{Candidates, Order};
 use super::racer::Racer;
 use super::space::Symbolic;
+use super::thinning::{FINALISTS, drop_twins, running, thin_out};
 use super::zdd::Node;
 use crate::budget::{Stop, Watch};
 use crate::net::Transition;
@@ -38,88 +29,12 @@ const FUEL: u64 = 1 << 15;
 const FUEL_PER_LEVEL: u64 = 16;
 /// How many times that each search has before the first drops out.
 const PATIENCE: u64 = 7;
-/// The rounds for which the order that the net came in, and its reverse, are spared when others drop out.
-const SPARED_ROUNDS: u32 = 2;
-/// The searches that run to the end, how many times less than the first of them the second gets, and how many times less
-/// those that stay beside them. These wait for some rounds, in which most leaders are done, and lose little by it: each
-/// round is as long as all before it.
-const FINALISTS: usize = 2;
+/// How many times less than the first of the last two the second gets, and how many times less those that stay beside
+/// them. These wait for some rounds, in which most leaders are done, and lose little by it: each round is as long as all
+/// before it.
 const RUNNER_UP: u64 = 4;
 const BESIDE: u64 = 8;
 const ROUNDS_ALONE: u32 = 3;
-
-/// Twins differ in their nodes by at most one in so many, after so many rounds.
-const TWINS_APART: usize = 12;
-const ROUNDS_ALIKE: u32 = 2;
-
-/// Keeps half of the field: in turn who has the fewest rounds to go at the pace of the last one, who has come farthest,
-/// and who has the fewest nodes for it. None of the three alone tells who wins. Of the last two, the first by pace leads,
-/// unless the other has come half as far again. Where memory has left only who is spared, these run for the first places.
-/// `thinned` counts the times; true where the last two are left, and who stays beside them.
-fn thin_out(field: &mut Vec<Racer>, thinned: u32) -> bool {
-    let mut spared: Vec<Racer> = field.extract_if(.., |racer| racer.spared).collect();
-    if field.is_empty() {
-        field.extend(spared.drain(..).map(|racer| Racer { spared: false, ..racer }));
-    }
-    if thinned == 1 || field.len() > FINALISTS {
-        let keep = FINALISTS.max(field.len() / 2);
-        let mut kept = Vec::new();
-        while kept.len() < keep && !field.is_empty() {
-            let rank = |racer: &Racer| {
-                let (done, nodes) = racer.standing();
-                let (left, gained) = (racer.order.len() - done as usize, done.saturating_sub(racer.before) as usize);
-                match kept.len() % 3 {
-                    0 if gained > 0 => (left / gained, nodes),
-                    0 => (usize::MAX, nodes),
-                    1 => (left, nodes),
-                    _ => (nodes / (done as usize + 1), nodes),
-                }
-            };
-            let best = (0..field.len()).min_by_key(|&at| rank(&field[at]));
-            kept.extend(best.map(|at| field.remove(at)));
-        }
-        if let [first, second] = &mut kept[..]
-            && 2 * second.standing().0 > 3 * first.standing().0
-        {
-            std::mem::swap(first, second);
-        }
-        let others = std::mem::replace(field, kept).into_iter();
-        let may_stay = |racer: &Racer| racer.is_shortest || racer.is_as_given();
-        spared.extend(others.filter(may_stay).map(|racer| Racer { spared: true, ..racer }));
-    }
-    spared.retain(|racer| racer.is_shortest || thinned <= SPARED_ROUNDS);
-    field.append(&mut spared);
-    running(field) <= FINALISTS && field.iter().all(|racer| !racer.spared || racer.is_shortest)
-}
-
-/// How many run for the first places.
-fn running(field: &[Racer]) -> usize {
-    field.iter().filter(|racer| !racer.spared).count()
-}
-
-/// Whether two searches, both begun, stand at the same level with about as many nodes.
-fn stand_alike(one: &Racer, other: &Racer) -> bool {
-    let ((level, nodes), (other_level, other_nodes)) = (one.standing(), other.standing());
-    let begun = one.begun.is_some() && other.begun.is_some();
-    begun && level == other_level && nodes.abs_diff(other_nodes) <= nodes.max(other_nodes) / TWINS_APART
-}
-
-/// Takes out the second of each two that have been twins for long enough, but none of the shortest order for another one.
-/// Of two that wait, standing still says nothing.
-fn drop_twins(field: &mut Vec<Racer>) {
-    for at in (1..field.len()).rev() {
-        if !field[at].ran {
-            continue;
-        }
-        let may_go = |first: &Racer| first.ran && (first.is_shortest || !field[at].is_shortest);
-        let alike = field[..at].iter().any(|first| may_go(first) && stand_alike(first, &field[at]));
-        field[at].alike = if alike { field[at].alike + 1 } else { 0 };
-        if field[at].alike >= ROUNDS_ALIKE && field.len() > FINALISTS {
-            field.remove(at);
-        }
-    }
-    field.iter_mut().for_each(|racer| racer.ran = false);
-}
 
 /// The searches for the markings of one net, each in an order of its own.
 pub(super) struct Race {
@@ -324,139 +239,8 @@ mod tests {
     use super::*;
     use crate::budget::unwatched;
 
-    const ROOM: usize = 1 << 26;
-    /// Results that bring a search some of the way along the ring, a little farther, and far.
+    /// Results that end no search.
     const SLOW: u64 = 400;
-    const NEAR: u64 = 600;
-    const FAR: u64 = 2000;
-
-    /// Searches for the markings of a ring on which tokens go either way, one for each order of its places.
-    fn field(orders: &[Order]) -> (Vec<Racer>, Vec<Transition>) {
-        let places = orders[0].len() as u32;
-        let moves = |from: u32, to: u32| Transition::new(&[from % places], &[to % places], &[], &[], &[]);
-        (
-            orders.iter().cloned().map(Racer::new).collect(),
-            (0..places).flat_map(|at| [moves(at, at + 1), moves(at + 1, at)]).collect(),
-        )
-    }
-
-    fn round(field: &mut Vec<Racer>, transitions: &[Transition], fuel: impl Fn(usize) -> u64) {
-        // The same from both ends of the ring.
-        let marked: Vec<u32> = (1..transitions.len() as u32 / 2).step_by(3).collect();
-        for (at, racer) in field.iter_mut().enumerate() {
-            let mut poll = unwatched;
-            racer.fuel = fuel(at);
-            let ended = racer.run(transitions, &marked, ROOM, &mut Watch::new(None, &mut poll));
-            assert_eq!(ended, Ok(None));
-        }
-        drop_twins(field);
-    }
-
-    fn orders() -> [Order; 4] {
-        let along: Order = (0..90).collect();
-        let across: Order = (0..90).map(|at| at * 7 % 90).collect();
-        [along.clone(), along.into_iter().rev().collect(), across.clone(), across.into_iter().rev().collect()]
-    }
-
-    #[test]
-    fn of_two_orders_that_stand_alike_twice_the_second_drops_out() {
-        let [along, back, across, _] = orders();
-        let (mut racers, transitions) = field(&[along.clone(), back, across.clone()]);
-        round(&mut racers, &transitions, |_| 200);
-        assert_eq!(racers.len(), 3);
-        round(&mut racers, &transitions, |_| 400);
-        assert_eq!(racers.iter().map(|racer| &racer.order).collect::<Vec<_>>(), [&along, &across]);
-    }
-
-    #[test]
-    fn of_two_that_wait_standing_still_makes_no_twins() {
-        let [along, back, across, _] = orders();
-        let (mut racers, transitions) = field(&[along, back, across]);
-        round(&mut racers, &transitions, |_| 200);
-        drop_twins(&mut racers);
-        assert_eq!((racers.len(), racers[1].alike), (3, 1));
-    }
-
-    #[test]
-    fn two_orders_that_stand_apart_are_both_kept() {
-        let (mut racers, transitions) = field(&orders());
-        for _ in 0..4 {
-            // The reverse orders get on less far.
-            round(&mut racers, &transitions, |at| if at % 2 == 0 { 400 } else { 200 });
-        }
-        assert_eq!(racers.len(), 4);
-    }
-
-    #[test]
-    fn two_ways_to_lay_a_ring_out_are_twins_and_the_last_two_stay() {
-        let [along, back, across, _] = orders();
-        let turned: Order = (45..90).chain(0..45).collect();
-        for two in [[along.clone(), turned, across], [along.clone(), back.clone(), along]] {
-            let (mut racers, transitions) = field(&two);
-            (0..4).for_each(|_| round(&mut racers, &transitions, |_| 200));
-            assert_eq!(racers.len(), 2);
-        }
-    }
-
-    #[test]
-    fn the_shortest_order_is_no_twin_of_another_one() {
-        let [along, back, across, _] = orders();
-        let turned: Order = (45..90).chain(0..45).collect();
-        for (is_shortest, left) in [(false, 2), (true, 3)] {
-            let (mut racers, transitions) = field(&[along.clone(), turned.clone(), across.clone()]);
-            racers.swap(0, 1);
-            racers[1].is_shortest = is_shortest;
-            (0..4).for_each(|_| round(&mut racers, &transitions, |_| 200));
-            assert_eq!(racers.len(), left);
-            assert_eq!(racers.iter().any(|racer| racer.order == along), is_shortest);
-        }
-        // Of both its directions one is enough.
-        let (mut racers, transitions) = field(&[along, back, across]);
-        racers[..2].iter_mut().for_each(|racer| racer.is_shortest = true);
-        (0..4).for_each(|_| round(&mut racers, &transitions, |_| 200));
-        assert_eq!(racers.len(), 2);
-    }
-
-    #[test]
-    fn of_the_last_two_the_first_by_pace_leads_unless_the_other_has_come_half_as_far_again() {
-        let [along, back, ..] = orders();
-        for (fuel, leader) in [(FAR, &back), (NEAR, &along)] {
-            let (mut racers, transitions) = field(&[along.clone(), back.clone()]);
-            round(&mut racers, &transitions, |at| if at == 0 { SLOW } else { fuel });
-            let (slow, far) = (racers[0].standing().0, racers[1].standing().0);
-            assert!(0 < slow && slow < far && (2 * far > 3 * slow) == (fuel == FAR), "{slow} {far}");
-            // Only the first has got on in the last round.
-            racers[1].before = far;
-            assert!(thin_out(&mut racers, 1));
-            assert_eq!((racers.len(), &racers[0].order), (2, leader));
-        }
-    }
-
-    #[test]
-    fn the_order_that_the_net_came_in_is_spared_for_two_rounds_beside_those_that_others_drop_out_of() {
-        let [along, back, across, crossed] = orders();
-        let other: Order = (0..90).map(|at| at * 11 % 90).collect();
-        let (mut racers, transitions) = field(&[across, crossed, other.clone(), other, along.clone(), back.clone()]);
-        // The last two have not begun, so that they are last by every measure.
-        let own = racers.split_off(4);
-        round(&mut racers, &transitions, |_| 400);
-        racers.extend(own);
-        for (thinned, left) in [(1, 5), (2, 4), (3, 2)] {
-            assert_eq!((thin_out(&mut racers, thinned), racers.len()), (thinned == 3, left));
-            let spared: Vec<&Order> = racers.iter().filter(|racer| racer.spared).map(|racer| &racer.order).collect();
-            assert_eq!(spared, if thinned < 3 { vec![&along, &back] } else { vec![] });
-        }
-    }
-
-    #[test]
-    fn where_memory_has_left_only_who_is_spared_these_run_to_the_end() {
-        let [along, back, ..] = orders();
-        let (mut racers, transitions) = field(&[along, back]);
-        round(&mut racers, &transitions, |at| 200 * (at as u64 + 1));
-        racers.iter_mut().for_each(|racer| racer.spared = true);
-        assert!(thin_out(&mut racers, SPARED_ROUNDS + 1));
-        assert_eq!((racers.len(), running(&racers)), (2, 2));
-    }
 
     /// Vehicles that overtake each other on a ring of zones, of which each holds one: all ways to place them.
     fn vehicles(count: u32, zones: u32) -> (usize, Vec<Transition>, Vec<u32>) {
@@ -527,16 +311,19 @@ mod tests {
         assert!(race.field.len() > 2 && race.field.iter().all(|racer| racer.order != gone));
     }
 
-    /// A race whose rounds are so short that nothing is over in the first of them, gone on with by one thread or two.
-    fn raced(count: u32, bytes: usize, first: u64, by_two: bool) -> (Result<Symbolic, Stop>, bool) {
+    /// A race that nothing ends in the first round of, gone on with by one thread or two, with so many results in the next.
+    fn raced(count: u32, bytes: usize, second: u64, by_two: bool) -> (Result<Symbolic, Stop>, bool) {
         let (places, transitions, initial) = vehicles(count, 4 * count);
-        let (second, mut poll) = (AtomicBool::new(by_two), unwatched);
-        let watch = &mut Watch::new(None, &mut poll).with_second(Some(&second));
+        let (free, mut poll) = (AtomicBool::new(by_two), unwatched);
+        let watch = &mut Watch::new(None, &mut poll).with_second(Some(&free));
         let mut race = Race::new(places, (transitions, initial), None, watch).expect("enough room");
-        (race.first, race.fuel) = (first, first);
+        (race.first, race.fuel) = (SLOW, SLOW);
         loop {
+            let is_first = race.spent == 0;
             match race.round(bytes, watch) {
+                Ok(None) if is_first => race.fuel = second,
                 Ok(None) => {}
+                Ok(Some(_)) if is_first => panic!("the race is over too soon"),
                 Ok(Some(found)) => return (Ok(found), race.apart),
                 Err(stop) => return (Err(stop), race.apart),
             }
@@ -546,8 +333,8 @@ mod tests {
     #[test]
     fn by_two_threads_the_same_search_wins_as_by_one() {
         // Over after many rounds, after some, and all in the second.
-        for first in [SLOW, 20 * SLOW, 1 << 24] {
-            let [one, two] = [false, true].map(|by_two| raced(4, 1 << 30, first, by_two));
+        for second in [2 * SLOW, 40 * SLOW, 1 << 24] {
+            let [one, two] = [false, true].map(|by_two| raced(4, 1 << 30, second, by_two));
             let [one, two] = [one, two].map(|(found, apart)| (found.expect("enough room"), apart));
             assert_eq!((one.0.place_at(), one.0.fired, one.0.nodes), (two.0.place_at(), two.0.fired, two.0.nodes));
             assert_eq!((one.1, two.1), (false, false));
@@ -557,10 +344,10 @@ mod tests {
     #[test]
     fn where_memory_does_not_do_for_two_at_a_time_one_goes_on_after_the_other() {
         let mut bytes = 1 << 16;
-        while raced(3, bytes, SLOW, false).0.is_err() {
+        while raced(3, bytes, 2 * SLOW, false).0.is_err() {
             bytes += bytes / 4;
         }
-        let (found, apart) = raced(3, bytes, SLOW, true);
+        let (found, apart) = raced(3, bytes, 2 * SLOW, true);
         assert_eq!((found.map(|_| ()), apart), (Ok(()), true));
     }
 
@@ -619,13 +406,6 @@ mod tests {
         let watch = &mut Watch::new(None, &mut poll);
         let race = Race::new(places, (transitions, initial), None, watch).expect("enough room");
         assert_eq!(race.run(1 << 16, watch).map(|_| ()), Err(Stop::Memory));
-    }
-
-    #[test]
-    fn searches_that_have_not_begun_are_no_twins() {
-        let (mut racers, _) = field(&orders());
-        (0..4).for_each(|_| drop_twins(&mut racers));
-        assert_eq!(racers.len(), 4);
     }
 
     #[test]
