@@ -48,9 +48,9 @@ demo: $(MADE)/install ## check, prove, bundle and run the one-robot cell, and se
 
 # The compiler of a crate, the installer and the type checker each leave a processor idle for long, so all goes on side by
 # side: the crate is checked and tested while the environment is made, of which the longest is the same crate, optimised as
-# shipped. The tests begin when they are compiled, once for all workers, and nothing was found that is found soon; types
-# and the crate's own tests go on beside them. What make says to its own children (MAKEFLAGS) is kept from cargo, which takes
-# it for an order to wait for make.
+# shipped. The tests begin when they are compiled, once for all workers, and the linters have found nothing; types and the
+# crate's own tests go on beside them. What make says to its own children (MAKEFLAGS) is kept from cargo, which takes it for
+# an order to wait for make.
 test: $(MADE)/rust-tools ## lint, format, types, and all tests
 	$(MAKE) --jobs=$(if $(MEANWHILE),4,3) --output-sync=target $(MADE)/develop test-rust lint test-last
 

@@ -243,10 +243,10 @@ def spelling(point: Point) -> Point | None:
                 name = str(int(name)) if name.isascii() and name.isdecimal() and int(name) <= _NUMBER_MAX else ""
             case "g":
                 name = str(UUID(name))
-            case "b" if not name.startswith("0x"):  # which asyncua reads as hexadecimal
-                name = b64encode(b64decode(name, validate=True)).decode()
-            case "b":
+            case "b" if name.startswith("0x"):  # which asyncua reads as hexadecimal
                 return None
+            case "b":
+                name = b64encode(b64decode(name, validate=True)).decode()
     except ValueError:
         return None
     if namespace > _NAMESPACE_MAX or not name:
