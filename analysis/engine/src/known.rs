@@ -289,16 +289,16 @@ mod tests {
     #[test]
     fn every_kind_of_set_numbers_markings_by_their_level() {
         for (length, expected) in [(20, 32), (40, 64), (60, 0)] {
-            let limits = Limits { step: false, markings: 20_000, memory_bytes: 1 << 30, time: None };
+            let limits = Limits { step: false, markings: 6_000, memory_bytes: 1 << 30, time: None };
             let space = Space::explore(chained(length), limits, &mut unwatched).expect("fits");
-            assert_eq!((kind(&space.set), space.len()), (expected, 20_000));
+            assert_eq!((kind(&space.set), space.len()), (expected, 6_000));
             let mut poll = unwatched;
             space.index(&mut Watch::new(None, &mut poll)).expect("fits");
             // As the plain way finds them.
             let mut plain: Vec<Vec<u64>> = vec![space.net.initial.clone()];
             let mut levels = std::collections::HashMap::from([(plain[0].clone(), 0)]);
             let mut next = 0;
-            while plain.len() < 60_000 && next < plain.len() {
+            while plain.len() < 18_000 && next < plain.len() {
                 for t in space.enabled_by(&space.net.forward, &plain[next]) {
                     let flip = space.net.flip(t as usize, space.net.words);
                     let after: Vec<u64> = plain[next].iter().zip(flip).map(|(a, b)| a ^ b).collect();

@@ -245,7 +245,7 @@ mod tests {
 
     #[test]
     fn later_transitions_sleep_that_share_no_place_that_either_changes() {
-        for net in random_nets(300) {
+        for net in random_nets(150) {
             let sleep = sleep_of(&net);
             for (s, a) in net.transitions.iter().enumerate() {
                 for (t, b) in net.transitions.iter().enumerate() {
@@ -296,7 +296,7 @@ mod tests {
 
     #[test]
     fn every_marking_is_found_at_its_level() {
-        for space in random_spaces(300, false) {
+        for space in random_spaces(150, false) {
             let mut levels = HashMap::from([(space.net.initial.clone(), 0)]);
             let mut now = vec![space.net.initial.clone()];
             for level in 1.. {

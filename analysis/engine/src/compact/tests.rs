@@ -122,7 +122,7 @@ fn a_way_is_found_in_the_memory_of_its_search_where_levels_do_not_fit_beside_it(
     nodes.push(Node::All((0..12).collect()));
     let busy = Formula::new(nodes, net.places).expect("well formed");
     let mut too_much = 0;
-    for memory_bytes in (40_000..140_000).step_by(1_500) {
+    for memory_bytes in (40_000..140_000).step_by(5_000) {
         let mut compact = Compact::new(net.clone(), vec![busy.clone()], memory_bytes).expect("few places");
         let Some(hit) = compact.search(false, None, &mut unwatched).goals[0] else { continue };
         let mut fits = |keep| {

@@ -145,7 +145,7 @@ mod tests {
 
     #[test]
     fn a_table_that_grows_in_place_keeps_every_key_and_takes_no_other() {
-        for (bits, count) in [(16, 1 << 16), (30, 200_000_u64), (33, 150_000)] {
+        for (bits, count) in [(16, 1 << 16), (30, 60_000_u64), (33, 50_000)] {
             let memory = Memory::new(1 << 24);
             let mut table = Exact::<u32>::reserving(bits, &memory).expect("fits");
             let mut asked = Asked::new();

@@ -345,7 +345,7 @@ mod tests {
 
     #[test]
     fn two_threads_find_what_one_finds_of_random_nets() {
-        for net in random_nets(300) {
+        for net in random_nets(150) {
             agree(&alone(&net, ALL), &by_two(&net, ALL));
         }
     }
@@ -426,7 +426,7 @@ mod tests {
 
     #[test]
     fn what_finds_no_room_is_put_where_it_belongs() {
-        for net in random_nets(200) {
+        for net in random_nets(80) {
             let all = alone(&net, ALL);
             for markings in [all.len() / 3, all.len() / 2, all.len() - 1] {
                 let limits = Limits { markings: markings.max(1), ..ALL };
