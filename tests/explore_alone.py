@@ -1,4 +1,4 @@
-"""What the tests of machines explored alone would do too, were it quicker: `make explore` does.
+"""What the tests of explored machines would do too, were it quicker: `make explore` does.
 
     pytest tests/explore_alone.py
 
@@ -37,6 +37,13 @@ def test_with_parts_that_promise_every_act_is_what_was_proved_and_all_there_is_i
     assert explore(Alone(decomposition, "mc", Reach()), CRASH, watch=watch).complete
     assert tie.actions["promise"] > 0
     assert net_tie.kinds["apply"] > 0
+
+
+def test_with_a_crash_every_act_is_some_actions_of_the_proof_and_all_there_is_is_explored() -> None:
+    decomposition = decomposition_of("remote_gate")
+    tie = LocalTie(decomposition)
+    assert explore(Explorer(decomposition), CRASH, watch=tie).complete
+    assert tie.actions["restart"] > 0
 
 
 def test_whatever_controllers_do_around_a_crash_they_do_alone() -> None:

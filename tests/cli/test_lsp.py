@@ -2,10 +2,10 @@
 
 import asyncio
 import sys
-from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
+from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import pytest
 from lsprotocol import types as lsp
@@ -15,7 +15,6 @@ from pygls.lsp.client import LanguageClient
 from firable.nets.catalogue import catalogue_path
 
 LATE = catalogue_path("one_robot_mc_late").read_text("utf-8")
-T = TypeVar("T")
 
 
 class Editor:
@@ -76,15 +75,16 @@ def on_line(range_: lsp.Range, line: int) -> lsp.Range:
 
 
 @asynccontextmanager
-async def editor(path: Path) -> AsyncIterator[Editor]:
+async def served() -> AsyncIterator[tuple[LanguageClient, dict[str, Editor]]]:
+    """A server, and the editors of files that hear of it."""
     client = LanguageClient("test", "1")
-    one = Editor(client, path)
+    editors: dict[str, Editor] = {}
 
     listen: Callable[[Callable[[lsp.PublishDiagnosticsParams], None]], object]
     listen = client.feature(lsp.TEXT_DOCUMENT_PUBLISH_DIAGNOSTICS)
 
     def published(params: lsp.PublishDiagnosticsParams) -> None:
-        one.published.put_nowait(params)
+        editors[params.uri].published.put_nowait(params)
 
     listen(published)
     stop: Callable[[], Awaitable[None]] = client.stop
@@ -92,22 +92,37 @@ async def editor(path: Path) -> AsyncIterator[Editor]:
     await client.initialize_async(lsp.InitializeParams(lsp.ClientCapabilities()))
     client.initialized(lsp.InitializedParams())
     try:
-        yield one
+        yield client, editors
     finally:
         await asyncio.wait_for(client.shutdown_async(None), 60)
         client.exit(None)
         await stop()
 
 
-def within(path: Path, act: Callable[[Editor], Awaitable[T]]) -> T:
-    async def whole() -> T:
-        async with editor(path) as one:
-            return await act(one)
-
-    return asyncio.run(whole())
+Act = Callable[[Editor], Awaitable[None]]
+Within = Callable[[Path, Act], None]
 
 
-def test_diagnostics_follow_the_text_and_verdicts_the_file(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def within() -> Iterator[Within]:
+    """Do something in an editor with one file; one server serves all of them, each as long as it is open."""
+
+    async def enter() -> tuple[LanguageClient, dict[str, Editor]]:
+        return await stack.enter_async_context(served())
+
+    async def whole(path: Path, act: Act) -> None:
+        one = editors[path.as_uri()] = Editor(client, path)
+        await act(one)
+        client.text_document_did_close(lsp.DidCloseTextDocumentParams(one.document))
+
+    stack = AsyncExitStack()
+    with asyncio.Runner() as runner:
+        client, editors = runner.run(enter())
+        yield lambda path, act: runner.run(whole(path, act))
+        runner.run(stack.aclose())
+
+
+def test_diagnostics_follow_the_text_and_verdicts_the_file(tmp_path: Path, within: Within) -> None:
     async def act(one: Editor) -> None:
         one.open(LATE)
         verdicts = await one.told(bool)
@@ -128,7 +143,9 @@ def test_diagnostics_follow_the_text_and_verdicts_the_file(tmp_path: Path) -> No
     within(tmp_path / "cell.firable.yaml", act)
 
 
-def test_a_transition_tells_what_it_waits_for_and_names_lead_to_their_definition(tmp_path: Path) -> None:
+def test_a_transition_tells_what_it_waits_for_and_names_lead_to_their_definition(
+    tmp_path: Path, within: Within
+) -> None:
     async def act(one: Editor) -> None:
         one.open(LATE)
         await one.told(bool)
@@ -153,7 +170,7 @@ def test_a_transition_tells_what_it_waits_for_and_names_lead_to_their_definition
     within(tmp_path / "cell.firable.yaml", act)
 
 
-def test_a_rename_changes_the_text_or_says_why_not(tmp_path: Path) -> None:
+def test_a_rename_changes_the_text_or_says_why_not(tmp_path: Path, within: Within) -> None:
     async def act(one: Editor) -> None:
         one.open(LATE)
         await one.told(bool)
@@ -182,7 +199,7 @@ def test_a_rename_changes_the_text_or_says_why_not(tmp_path: Path) -> None:
     within(tmp_path / "cell.firable.yaml", act)
 
 
-def test_a_cure_is_offered_as_an_action_while_the_text_is_the_checked_one(tmp_path: Path) -> None:
+def test_a_cure_is_offered_as_an_action_while_the_text_is_the_checked_one(tmp_path: Path, within: Within) -> None:
     def actions(one: Editor, line: int) -> Awaitable[Any]:
         here = lsp.Range(lsp.Position(line, 0), lsp.Position(line, 1))
         params = lsp.CodeActionParams(one.document, here, lsp.CodeActionContext([]))
@@ -211,7 +228,7 @@ def test_a_cure_is_offered_as_an_action_while_the_text_is_the_checked_one(tmp_pa
     within(tmp_path / "cell.firable.yaml", act)
 
 
-def test_what_the_file_expects_of_no_verdict_is_told_at_its_place(tmp_path: Path) -> None:
+def test_what_the_file_expects_of_no_verdict_is_told_at_its_place(tmp_path: Path, within: Within) -> None:
     async def act(one: Editor) -> None:
         one.open(LATE + "expect: {deadlock-fre: violated}\n")
         (wrong,) = await one.told(bool)
@@ -220,7 +237,9 @@ def test_what_the_file_expects_of_no_verdict_is_told_at_its_place(tmp_path: Path
     within(tmp_path / "cell.firable.yaml", act)
 
 
-def test_names_are_offered_while_a_bracket_is_open_and_take_the_place_of_what_is_typed(tmp_path: Path) -> None:
+def test_names_are_offered_while_a_bracket_is_open_and_take_the_place_of_what_is_typed(
+    tmp_path: Path, within: Within
+) -> None:
     async def act(one: Editor) -> None:
         one.open(LATE)
         await one.told(bool)
@@ -240,7 +259,7 @@ def test_names_are_offered_while_a_bracket_is_open_and_take_the_place_of_what_is
     within(tmp_path / "cell.firable.yaml", act)
 
 
-def test_names_and_symbols_are_offered_and_columns_are_those_of_the_client(tmp_path: Path) -> None:
+def test_names_and_symbols_are_offered_and_columns_are_those_of_the_client(tmp_path: Path, within: Within) -> None:
     text = 'firable: 1\ncell: "\U0001f916"\nplaces: {p: {description: "\U0001f916"}, q: }\nstart: p\n'
 
     async def act(one: Editor) -> None:

@@ -70,14 +70,14 @@ def cut_survivors(bundle: Bundle, one_in: int) -> tuple[int, list[tuple[str, Cal
 @pytest.mark.seeds
 def test_every_single_change_of_subnets_table_and_groups_in_layers_is_refused() -> None:
     count, found = cut_survivors(Bundle(split(catalogue_net("two_cells")), (), {}), 11)
-    assert count > 800
+    assert count > 400
     assert [how for how, _ in found if not how.startswith("net: ")] == []
 
 
 def test_every_single_change_of_a_net_in_layers_is_refused() -> None:
     bundle = bundled()
     count, found = cut_survivors(bundle, 1)
-    assert count > 1000
+    assert count > 500
     assert all(how.startswith("net: ") for how, _ in found)
     survivors = []
     for how, make in found:
@@ -114,7 +114,7 @@ def test_every_single_change_of_a_verdict_on_the_protocol_in_layers_is_refused(
         (how, make) for how, make in verdict_mutants(bundle) if how.startswith(tuple(f"verdict {t}." for t in TITLES))
     ]
     mutants = some([(how, make) for how, make in mutants if PREFIX not in how], 8)
-    assert len(mutants) > 15
+    assert len(mutants) > 8
     for how, make in mutants:
         try:
             mutant = Examination(make())

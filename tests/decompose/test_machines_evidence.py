@@ -192,7 +192,7 @@ def test_evidence_on_the_machines_that_is_missing_or_exchanged_is_refused() -> N
         (how, make) for how, make in evidence_mutants(bundled()) if how.startswith(tuple(FILES)) and how not in others
     ]
     assert len(mutants) > 25
-    for how, make in mutants:
+    for how, make in some(mutants, 1):
         assert refused(make()), how
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from support.examples import some
 
 from firable.analysis.induction.smt import Answer
 from firable.decompose.proofs.script import Reader
@@ -72,12 +73,15 @@ def fails(protocol: Protocol, names: tuple[str, ...]) -> bool:
 
 @pytest.mark.parametrize(
     ("action", "demand"),
-    [
-        pytest.param(action, demand, id=f"{action.name}-{demand.words}")
-        for action in PROTOCOL.actions
-        for demand in action.demands
-        if demand.words != "it is a signal"  # the proof would hold for whatever else the cell may change
-    ],
+    some(
+        (
+            pytest.param(action, demand, id=f"{action.name}-{demand.words}")
+            for action in PROTOCOL.actions
+            for demand in action.demands
+            if demand.words != "it is a signal"  # the proof would hold for whatever else the cell may change
+        ),
+        1,
+    ),
 )
 def test_no_demand_can_be_left_out(action: Action, demand: Demand) -> None:
     assert fails(without(action, demand), (f"keeps.{action.name}", f"follows.{action.name}"))
@@ -93,12 +97,15 @@ def test_no_assumption_on_the_net_can_be_left_out(words: str) -> None:
 
 @pytest.mark.parametrize(
     ("action", "changes"),
-    [
-        (a.name, up.relation.name)
-        for a in PROTOCOL.actions
-        for up in a.updates
-        if a.name not in {"forget", "sense-late"}
-    ],
+    some(
+        (
+            (a.name, up.relation.name)
+            for a in PROTOCOL.actions
+            for up in a.updates
+            if a.name not in {"forget", "sense-late"}
+        ),
+        1,
+    ),
 )
 def test_no_change_can_be_left_out(action: str, changes: str) -> None:
     its = PROTOCOL.action(action)
@@ -107,7 +114,7 @@ def test_no_change_can_be_left_out(action: str, changes: str) -> None:
     assert fails(protocol, (f"keeps.{action}", f"home.{action}", f"complete.{action}"))
 
 
-@pytest.mark.parametrize("conjunct", INVARIANT, ids=lambda conjunct: conjunct.name)
+@pytest.mark.parametrize("conjunct", some(INVARIANT, 1), ids=lambda conjunct: conjunct.name)
 def test_no_conjunct_can_be_left_out(conjunct: Conjunct) -> None:
     kept = tuple(other for other in INVARIANT if other is not conjunct)
     reader = small(PROTOCOL, kept)

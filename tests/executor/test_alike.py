@@ -54,10 +54,13 @@ def said(effects: list[Effect], one: str = "", other: str = "") -> set[Effect]:
 
 @cache
 def explored(cell: str, t: str) -> Deciding:
-    """The coordinator of a cell explored to the end about the group of a transition; only looked at and copied."""
+    """The coordinator of a cell explored to the end about the group of a transition; only looked at and copied.
+
+    With a crash where the group is small.
+    """
     decomposition = decomposition_of(cell)
     explorer = Deciding(decomposition, TOP, group_of(decomposition, t))
-    assert explore(explorer, CRASH).complete
+    assert explore(explorer, CRASH if cell == "one_robot" else Budget()).complete
     return explorer
 
 
@@ -104,7 +107,7 @@ def test_whatever_is_forgotten_between_configurations_is_found_out_again() -> No
     for most in (10, 1_000_000):
         explorer = Deciding(decomposition, TOP, group_of(decomposition, "G4"))
         explorer.passing_max = most
-        spaces.append(explore(explorer, CRASH))
+        spaces.append(explore(explorer))
         met.append(explorer.met)
     assert spaces[0] == spaces[1]
     assert met[0] > met[1], "what was forgotten is met again"

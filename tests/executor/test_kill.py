@@ -58,7 +58,7 @@ def test_cell_whose_controllers_are_killed_again_and_again_does_all_its_work_onc
 ) -> None:
     """In virtual time, and with a speed on an event loop whose thread stores while the acts go on."""
     while_storing = 0
-    for seed in seeds(2):
+    for seed in seeds(1):
         folder = tmp_path / str(seed)
         folder.mkdir()
         ended = lives(folder, cell, 4, seed, *speed)

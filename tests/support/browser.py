@@ -1,4 +1,7 @@
-"""A real browser for the tests of the page: Chromium of the system, without a window; without it they are skipped."""
+"""A real browser for the tests of the page: Chromium of the system, without a window; without it they are skipped.
+
+Debian has the part of it that needs no window in a package of its own, which asks a fifth less of a processor.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,8 @@ import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, sync_playwright
 from support.waiting import heard_in_time
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+PROGRAMS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
+CHROMIUM = next(filter(None, map(shutil.which, PROGRAMS)), None)
 needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed here")
 PATIENCE_MS = 60_000.0
 """So long a browser may take for what it does in milliseconds: the machine of the tests may be busy."""
