@@ -8,9 +8,9 @@ BIN := $(VENV)/bin
 MADE := $(VENV)/made
 CRATE := analysis/engine
 CARGO_OPTIONS := --locked --manifest-path $(CRATE)/Cargo.toml
-# Some tests wait for links, devices and browsers, so three workers more than there are processors. Files go in their order:
+# Some tests wait for links, devices and browsers, so two workers more than there are processors. Files go in their order:
 # those with few tests, which have the longest, would else come last, and one worker would end alone.
-PYTEST_OPTIONS ?= -q -n $(shell echo $$(($$(nproc 2>/dev/null || echo 1) + 3))) --dist loadfile --no-loadscope-reorder
+PYTEST_OPTIONS ?= -q -n $(shell echo $$(($$(nproc 2>/dev/null || echo 1) + 2))) --dist loadfile --no-loadscope-reorder
 # A command to run beside the build of the crate, before the tests; `.ci/run` installs what some of them need.
 MEANWHILE ?=
 # A campaign: how many times the examples of a test run, from which seed, and in which folder of tests.

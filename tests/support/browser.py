@@ -1,6 +1,6 @@
 """A real browser for the tests of the page: Chromium of the system, without a window; without it they are skipped.
 
-Debian has the part of it that needs no window in a package of its own, which asks a fifth less of a processor.
+The part of it that needs no window, which Debian packages by itself, asks a fifth less of a processor.
 """
 
 from __future__ import annotations
