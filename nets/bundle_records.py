@@ -18,13 +18,13 @@ from firable.nets.verdict import Cost, Cure, Status, Verdict, Wait, Weight, Witn
 
 
 class _Record(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", strict=True, frozen=True)
 
 
 class VersionRecord(BaseModel):
     """What a manifest of any version begins with."""
 
-    model_config = ConfigDict(extra="ignore", strict=True, frozen=True)
+    model_config = ConfigDict(defer_build=True, extra="ignore", strict=True, frozen=True)
 
     firable_bundle: int
 

@@ -76,13 +76,13 @@ _NO_NAMES: Final[Any] = ()
 class StrictDocument(BaseModel):
     """A mapping with no keys but its own."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, populate_by_name=False)
+    model_config = ConfigDict(defer_build=True, extra="forbid", strict=True, frozen=True, populate_by_name=False)
 
 
 class _Extensible(BaseModel):
     """A mapping whose further keys are parameters, each a text."""
 
-    model_config = ConfigDict(extra="allow", strict=True, frozen=True)
+    model_config = ConfigDict(defer_build=True, extra="allow", strict=True, frozen=True)
     # As pydantic's documentation has it; other type checkers object, for the attribute is mutable.
     # ty: ignore[incompatible-mutable-override]
     __pydantic_extra__: dict[str, str]  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -207,6 +207,7 @@ class PropertyDocument(StrictDocument):
     """One temporal pattern, or one formula of CTL or LTL."""
 
     model_config = ConfigDict(
+        defer_build=True,
         extra="forbid",
         strict=True,
         frozen=True,

@@ -251,7 +251,7 @@ def _no_formula(name: str, error: FormulaError) -> InputError:
 
 
 class _Record(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", strict=True, frozen=True)
 
 
 class _ControllerRecord(_Record):

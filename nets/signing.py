@@ -41,7 +41,7 @@ _Hex64 = Annotated[str, Field(pattern="^[0-9a-f]{128}$")]
 class SignaturesRecord(BaseModel):
     """The file of signatures: the bundle that they are of, and for each public key its signature."""
 
-    model_config = ConfigDict(extra="forbid", strict=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", strict=True)
     firable_signatures: Literal[1] = 1
     bundle: _Hex32
     signatures: dict[_Hex32, _Hex64]

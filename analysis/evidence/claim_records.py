@@ -28,7 +28,7 @@ APART_MAX: Final = 100_000
 class Data(BaseModel):
     """Data of one shape; whatever else stands there is refused."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", strict=True, frozen=True)
 
 
 class ClaimRecord(Data):
@@ -40,7 +40,8 @@ class ClaimRecord(Data):
     fairness: Fairness = Fairness.NONE
     fires: list[str] = []
 
-    model_config = ConfigDict(extra="forbid", strict=False, frozen=True)  # not strict: an enumeration is a string here
+    # Not strict: an enumeration is a string here.
+    model_config = ConfigDict(defer_build=True, extra="forbid", strict=False, frozen=True)
 
     def of(self, net: Net) -> Claim:
         """The claim, its names looked up."""

@@ -47,7 +47,7 @@ Writing = Annotated[str, BeforeValidator(lambda value: str(value).lower() if isi
 
 class _Model(BaseModel):
     # The tree of a file resolves no numbers: a text that is one is taken for it.
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
 
 
 class HeartbeatDocument(_Model):
@@ -92,7 +92,7 @@ class ChannelDocument(_Model):
 class DeviceDocument(_Model):
     """One device: its kind, its channels, its safe outputs; the other keys are of its kind."""
 
-    model_config = ConfigDict(extra="allow")
+    model_config = ConfigDict(defer_build=True, extra="allow")
     driver: Name
     channels: dict[Name, ChannelDocument] = {}
     safe: dict[Name, Writing] = {}

@@ -83,7 +83,7 @@ Password = Annotated[str | None, AfterValidator(_of_a_user)]
 class Options(BaseModel):
     """The keys of a device in a binding that its kind knows, beside those that all kinds have."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
 
     def far_end(self) -> object:
         """What is equal of two devices that are one, however each is spoken with; by default all options."""

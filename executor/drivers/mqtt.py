@@ -58,7 +58,7 @@ NOT_LET_IN: Final = frozenset({134, 135})
 class MqttTls(BaseModel):
     """The files of TLS: the authority of the broker, and a certificate of one's own where the broker asks for one."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
     ca: File | None = None
     certificate: File | None = None
     key: File | None = None

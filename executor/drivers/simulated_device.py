@@ -33,7 +33,7 @@ Bit = Annotated[int, Field(ge=0, le=1)]
 class Effect(BaseModel):
     """How long a command takes, and what sensors show when it is done."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
     seconds: Seconds | None = None
     then: dict[str, Bit] = {}
 

@@ -51,7 +51,7 @@ Seconds = Annotated[float, BeforeValidator(_number), Field(ge=0, le=1e6, allow_i
 
 
 class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, populate_by_name=False)
+    model_config = ConfigDict(defer_build=True, extra="forbid", strict=True, frozen=True, populate_by_name=False)
 
 
 class Failure(StrEnum):
