@@ -12,11 +12,11 @@ from firable.executor.drivers.device import Wanted, Writes
 from firable.executor.drivers.far_side.modbus_server import ModbusTcpEnd
 from firable.executor.drivers.keeping import Kept, Nobody
 
-BINDING = """{firable_bind: 1, cell: c, devices: {D: {driver: modbus-tcp, host: h, timeout_s: 1, retry_s: 0.02,
+BINDING = """{firable_bind: 1, cell: c, devices: {D: {driver: modbus-tcp, host: h, timeout_s: 2, retry_s: 0.02,
 safe: {coil 1: false}, heartbeat: {write: holding 9, every_s: 0.05}}}}"""
 BLOCKS = tuple(f"{table} {at}" for table in ("input", "discrete", "coil", "holding") for at in (0, 100, 200))
 """Each is a question of its own: all of them take longer than an answer may."""
-ANSWER_S = 0.15
+ANSWER_S = 0.2
 SAFE, BEAT, GO = ("coil", 1), ("holding", 9), ("coil", 7)
 WRITES = {5: "coil", 15: "coil", 6: "holding", 16: "holding"}
 
