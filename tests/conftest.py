@@ -43,6 +43,17 @@ def asked_once() -> Iterator[None]:
         yield
 
 
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """Nothing of Python's own is called at a collection of garbage, where the exception of a Ctrl-C would be ignored.
+
+    Hypothesis, once it has run, notes there how long collections take.
+    """
+    called, gc.callbacks[:] = list(gc.callbacks), []
+    yield
+    gc.callbacks[:] = called
+
+
 def pytest_collectstart() -> None:
     gc.disable()
 

@@ -254,6 +254,7 @@ def test_a_solver_that_is_at_work_ends_by_the_clock() -> None:
     assert decide_by_parikh(*split_market(), Limits(Deadline.after(0.5))).bound == "the time was over"
 
 
+@pytest.mark.usefixtures("interruptible")
 def test_a_solver_that_is_at_work_ends_by_ctrl_c() -> None:
     before = active_count()
     timer = Timer(0.5, signal.raise_signal, [signal.SIGINT])

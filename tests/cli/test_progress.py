@@ -193,6 +193,7 @@ def test_a_technique_that_is_named_tells_how_far_it_is_and_ends_by_itself(
     assert "reached: bounded model checking does not decide it" in told.out  # whether it is live
 
 
+@pytest.mark.usefixtures("interruptible")
 def test_ctrl_c_in_a_bounded_search_shows_how_far_it_has_come(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

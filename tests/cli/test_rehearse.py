@@ -89,6 +89,7 @@ def test_ctrl_c_shows_what_the_runs_until_then_came_to(
         assert (said.out, said.err.strip()) == ("", "interrupted: nothing is known yet")
 
 
+@pytest.mark.usefixtures("interruptible")
 def test_ctrl_c_ends_all_processes_and_shows_what_their_runs_came_to(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

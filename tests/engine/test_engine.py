@@ -448,6 +448,7 @@ def test_an_exploding_step_component_ends_with_a_reason() -> None:
         assert (graph.complete, graph.reason, graph.n_markings) == (False, reason, 1)
 
 
+@pytest.mark.usefixtures("interruptible")
 def test_ctrl_c_gives_what_is_known_so_far() -> None:
     net = machines(26)
     timer = threading.Timer(0.2, signal.raise_signal, [signal.SIGINT])
@@ -460,6 +461,7 @@ def test_ctrl_c_gives_what_is_known_so_far() -> None:
     assert graph.n_markings > 1
 
 
+@pytest.mark.usefixtures("interruptible")
 def test_what_a_signal_handler_raises_is_not_swallowed() -> None:
     class StopEverythingError(Exception):
         pass
