@@ -185,6 +185,7 @@ def test_every_single_change_of_a_verdict_on_the_machines_is_refused() -> None:
         assert refused(mutant), how
 
 
+@pytest.mark.seeds
 @pytest.mark.usefixtures("remembering", "unchanged")
 def test_evidence_on_the_machines_that_is_missing_or_exchanged_is_refused() -> None:
     others = {f"{one} is {other}" for one in FILES for other in set(bundled().evidence) - FILES}

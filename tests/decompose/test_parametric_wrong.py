@@ -71,6 +71,7 @@ def fails(protocol: Protocol, names: tuple[str, ...]) -> bool:
     return any(reader.answer(o.block) is Answer.SAT for o in chosen)
 
 
+@pytest.mark.seeds
 @pytest.mark.parametrize(
     ("action", "demand"),
     some(
@@ -95,6 +96,7 @@ def test_no_assumption_on_the_net_can_be_left_out(words: str) -> None:
     )
 
 
+@pytest.mark.seeds
 @pytest.mark.parametrize(
     ("action", "changes"),
     some(
@@ -114,6 +116,7 @@ def test_no_change_can_be_left_out(action: str, changes: str) -> None:
     assert fails(protocol, (f"keeps.{action}", f"home.{action}", f"complete.{action}"))
 
 
+@pytest.mark.seeds
 @pytest.mark.parametrize("conjunct", some(INVARIANT, 1), ids=lambda conjunct: conjunct.name)
 def test_no_conjunct_can_be_left_out(conjunct: Conjunct) -> None:
     kept = tuple(other for other in INVARIANT if other is not conjunct)

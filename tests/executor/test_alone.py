@@ -39,6 +39,7 @@ CRASH = Budget(crashes=1)
 # --- What is met among all machines is met alone
 
 
+@pytest.mark.seeds  # a campaign loses messages of each of them
 @pytest.mark.parametrize(
     ("name", "faults"),
     [
