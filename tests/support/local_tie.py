@@ -236,7 +236,8 @@ class LocalTie:
         self.actions.update(action for action, _ in released)
         fired = [e.transition for e in step.effects if isinstance(e, Firing)]
         # Who is held after a restart sends no command, and clears its signals all the same.
-        moved = {*fired, *(t for _, t, _ in commit)}
+        # An order that was obeyed before, or is lost in a crash, clears nothing: the restart does.
+        moved = {*fired, *(t for r, t, whose in commit if (r, t, whose) in fresh)}
         cleared = {signal for t, signal in self.structure.relations["clears"] if t in moved}
         places = {place.name for place in self.net.places}
         changed = {key[0] for key in first.relations["marked"] ^ last.relations["marked"]} - places
