@@ -24,9 +24,10 @@ from __future__ import annotations
 import random
 from collections import Counter, deque
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import partial
 from math import inf
+from operator import itemgetter
 from typing import Any, Final
 
 from firable.executor.protocol.commands import Answer
@@ -298,26 +299,38 @@ def explore(
 def wander(explorer: Explorer, budget: Budget, seed: int, length: int, watch: Watcher) -> Counter[str]:
     """Go one way of so many steps through what is too much to be explored; `watch` sees the steps beside it, too.
 
-    Each kind of step that may come next is as likely as every other, and faults are spread over the way. Returns how
-    often each was taken. Cost: `length` times the steps that a configuration has, some twenty; the code runs anew in
-    most of them.
+    Each kind of step that may come next is as likely as every other, and faults are spread over the way. One seed is
+    one way, in every process. Returns how often each kind was taken. Cost: `length` times the steps that a
+    configuration has, some twenty; the code runs anew in most of them.
     """
     draw, taken = random.Random(seed), Counter[str]()
     at = explorer.initial(budget)
     for _ in range(length):
-        kinds: dict[str, list[Configuration]] = {}
+        kinds: dict[str, list[tuple[tuple[int, str], Configuration]]] = {}
         for step, after in explorer.steps(at):
             watch(explorer, at, step, after)
             if after != at:
-                kinds.setdefault(step.kind, []).append(after)
+                kinds.setdefault(step.kind, []).append(((step.machine, _words(step.about)), after))
         if not kinds:
             break
         faults = {kind for kind in kinds if kind in ("lose", "give up") or kind.endswith("crash")}
         wanted = kinds.keys() & faults if draw.random() < _FAULTS_ON_A_WAY else kinds.keys() - faults
         kind = draw.choice(sorted(wanted or kinds))
         taken[kind] += 1
-        at = draw.choice(kinds[kind])
+        _, at = draw.choice(sorted(kinds[kind], key=itemgetter(0)))  # for steps come in the order of sets
     return taken
+
+
+def _words(value: object) -> str:
+    """What a step is about, in words that are the same in every process."""
+    match value:
+        case frozenset():
+            return f"{{{', '.join(sorted(map(_words, value)))}}}"
+        case tuple():
+            return f"({', '.join(map(_words, value))})"
+        case _ if is_dataclass(value):
+            return f"{type(value).__name__}({', '.join(_words(getattr(value, each.name)) for each in fields(value))})"
+    return repr(value)
 
 
 def _less(budget: Budget, kind: str) -> Budget:

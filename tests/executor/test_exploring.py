@@ -1,5 +1,8 @@
 """The code of the protocol explored to the end on small nets, with faults: each act of it is actions of the proof."""
 
+import os
+import subprocess
+import sys
 from collections import Counter
 from dataclasses import replace
 from functools import cache
@@ -156,6 +159,29 @@ def test_on_ways_through_nets_too_large_to_be_explored_every_act_is_some_actions
         wander(Explorer(decomposition), Budget(2, 2, 2, 2), FIRST_SEED, 70, tie)
         met += tie.actions
     assert {action.name for action in PROTOCOL.actions} - OF_FREE_PARTS <= set(met)
+
+
+WAY = """
+from firable.decompose.splitting.cut import split
+from firable.executor.simulation.exploring import Explorer, wander
+from firable.executor.simulation.repertoire import Budget
+from firable.nets.catalogue import catalogue_net
+seen = []
+explorer = Explorer(split(catalogue_net("one_robot")))
+wander(explorer, Budget(2, 2, 2, 2), 3, 40, lambda _, at, step, after: seen.append((step.kind, step.machine)))
+print(sorted(seen))
+"""
+
+
+def test_one_seed_is_one_way_in_every_process() -> None:
+    """Texts are hashed otherwise in each, and sets of messages come in the order of hashes."""
+    told = []
+    for seed in ("1", "2"):
+        environment = {**os.environ, "PYTHONHASHSEED": seed}
+        command = [sys.executable, "-c", WAY]
+        told.append(subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout)
+    assert told[0].count("arrive") > 50
+    assert told[0] == told[1]
 
 
 FOUND_IN_LAYERS = [

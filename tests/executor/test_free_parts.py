@@ -25,7 +25,7 @@ from firable.executor.protocol.messages import (
 )
 from firable.executor.simulation.drawn import DRAWN
 from firable.executor.simulation.exploring import Explorer, NotATraceError, explore, wander
-from firable.executor.simulation.repertoire import Budget
+from firable.executor.simulation.repertoire import Budget, Configuration, Step
 from firable.nets.catalogue import catalogue_net
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Net
@@ -64,6 +64,21 @@ def test_on_ways_through_larger_nets_with_free_parts_every_act_is_some_actions_o
         assert tie.actions["stand"] > 0 or not decomposition.free, name
         met += tie.actions
     assert met["apply-free"] > 0
+
+
+@pytest.mark.parametrize("seed", [25, 26])
+def test_an_order_that_is_lost_in_a_crash_clears_no_timer(seed: int) -> None:
+    """The restart does, as the signal may change by itself; on these ways one order is lost so."""
+    decomposition = freed(split(DRAWN["drawn-timed"](0)))
+    tie, lost = LocalTie(decomposition), 0
+
+    def watch(explorer: Explorer, at: Configuration, step: Step, after: Configuration) -> None:
+        nonlocal lost
+        tie(explorer, at, step, after)
+        lost += step.kind == "arrive, crash" and isinstance(step.about, Decision) and step.about.committed is not None
+
+    wander(Explorer(decomposition), Budget(2, 2, 2, 2), seed, 150, watch)
+    assert lost > 0
 
 
 FAULTS: list[tuple[type, str, Budget]] = [
