@@ -207,7 +207,6 @@ class PropertyDocument(StrictDocument):
     """One temporal pattern, or one formula of CTL or LTL."""
 
     model_config = ConfigDict(
-        defer_build=True,
         extra="forbid",
         strict=True,
         frozen=True,

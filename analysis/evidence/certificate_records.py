@@ -198,8 +198,7 @@ class _ProgressRecord(Data):
     ranks: list[list[Natural]]
     helpful: list[tuple[list[Natural], str]]
 
-    # Not strict: a pair is an array here.
-    model_config = ConfigDict(defer_build=True, extra="forbid", strict=False, frozen=True)
+    model_config = ConfigDict(extra="forbid", strict=False, frozen=True)  # not strict: a pair is an array here
 
     def of(self, net: Net, sets: Sequence[Markings | Diagram]) -> Progress:
         helpful = tuple((tuple(prefix), known(name, net.transition_index)) for prefix, name in self.helpful)

@@ -40,8 +40,7 @@ class ClaimRecord(Data):
     fairness: Fairness = Fairness.NONE
     fires: list[str] = []
 
-    # Not strict: an enumeration is a string here.
-    model_config = ConfigDict(defer_build=True, extra="forbid", strict=False, frozen=True)
+    model_config = ConfigDict(extra="forbid", strict=False, frozen=True)  # not strict: an enumeration is a string here
 
     def of(self, net: Net) -> Claim:
         """The claim, its names looked up."""

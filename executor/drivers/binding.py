@@ -92,7 +92,7 @@ class ChannelDocument(_Model):
 class DeviceDocument(_Model):
     """One device: its kind, its channels, its safe outputs; the other keys are of its kind."""
 
-    model_config = ConfigDict(defer_build=True, extra="allow")
+    model_config = ConfigDict(extra="allow")
     driver: Name
     channels: dict[Name, ChannelDocument] = {}
     safe: dict[Name, Writing] = {}
