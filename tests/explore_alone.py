@@ -46,6 +46,14 @@ def test_with_a_crash_every_act_is_some_actions_of_the_proof_and_all_there_is_is
     assert tie.actions["restart"] > 0
 
 
+def test_whatever_controllers_do_where_a_gate_is_read_again_they_do_alone() -> None:
+    decomposition, reach = decomposition_of("gate_read_again"), Reach(rounds=1, focus=TOP)
+    among_all = Acts(reach, 0)
+    assert explore(Explorer(decomposition), Budget(losses=1), max_configurations=1_000_000, watch=among_all).complete
+    contained(among_all, alone(decomposition, reach, Budget()))
+    assert among_all.beyond == 0
+
+
 def test_whatever_controllers_do_around_a_crash_they_do_alone() -> None:
     decomposition, reach = decomposition_of("remote_gate"), Reach(rounds=1, focus=TOP)
     among_all = Acts(reach, 1)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 from support import planted
 from support.alone_acts import CELLS, Acts, alone, contained, decomposition_of, group_of
-from support.examples import FACTOR, IN_CAMPAIGN
+from support.examples import FACTOR
 from support.free_parts import CountsEarlierEpochs, CountsUsedVotes
 from support.local_net_tie import LocalNetTie
 from support.local_tie import LocalTie
@@ -39,17 +39,16 @@ CRASH = Budget(crashes=1)
 # --- What is met among all machines is met alone
 
 
-@pytest.mark.seeds  # a campaign loses messages of each of them
 @pytest.mark.parametrize(
     ("name", "faults"),
     [
         ("remote_gate", Budget(losses=1, copies=1)),
         ("local_conflict", Budget(losses=1)),
-        ("gate_read_again", Budget(losses=int(IN_CAMPAIGN))),
         ("free ring", Budget()),
     ],
 )
 def test_whatever_controllers_do_among_all_machines_they_do_alone(name: str, faults: Budget) -> None:
+    """`make explore` does the same to a net whose gate is read again."""
     decomposition, reach = decomposition_of(name), Reach(rounds=1, focus=TOP)
     among_all = Acts(reach, 0)
     assert explore(Explorer(decomposition), faults, max_configurations=30_000, watch=among_all).complete
