@@ -39,9 +39,12 @@ Edge = tuple[Sort, Sort]
 
 
 def dependencies(formulas: Iterable[Formula]) -> frozenset[Edge]:
-    """The pairs of sorts (of an argument, of the value) of all functions that stand in formulas or stand for them."""
+    """The pairs of sorts (of an argument, of the value) of all functions that stand in formulas or stand for them.
+
+    A formula that stands there many times, as those that all obligations begin with, is looked at once.
+    """
     found: set[Edge] = set()
-    for formula in formulas:
+    for formula in {id(formula): formula for formula in formulas}.values():
         found.update(_choices(formula, {}, holds=True))
         for part in subformulas(formula):
             for term in terms_of(part):

@@ -59,7 +59,7 @@ class _NotProvedError(Exception):
 @cache
 def _proved(timeout_ms: int) -> tuple[tuple[Verdict, ...], str]:
     obligations = tuple(parametric_obligations())
-    sorts = order({edge for obligation in obligations for edge in dependencies(obligation.script.formulas)})
+    sorts = order(dependencies(formula for obligation in obligations for formula in obligation.script.formulas))
     assert sorts is not None, "the theorem is outside the decidable fragment"
     head = "".join(f"; {line}\n" for line in (*_HEAD, f"  {', '.join(sort.name for sort in sorts)}."))
     beginning = head + start()
