@@ -7,7 +7,9 @@ A yes vote is a promise (O1): until the round is decided, the parts promised are
 local transitions, other promises, and changes of the signals that the promised parts read or clear, latched outside
 the process image and taken in when the lock is released. So an external gate that was open at the vote is open, in
 the image, at the commit, and the commit always finds its part enabled. (The signal itself may have dropped meanwhile:
-Eq. (8) then means "each true at its own vote", which SEMANTICS O4 accepts for gates that no command clears.)
+Eq. (8) then means "each true at its own vote", which SEMANTICS O4 accepts for gates that no command clears.) That is
+for the commit alone: whatever else reads the signal, local transitions and later votes, waits where what it shows now
+closes a gate, or one would command a machine on an interlock that has opened long ago.
 
 A part that is *free of promise* votes by what the controller reports: when it is enabled and no promise here disturbs
 it. The vote stands until the order comes, and nothing waits for it; then the part finds its inputs full and its outputs
@@ -434,16 +436,21 @@ class LocalController:
         return changed_pieces(kept, self.word)
 
     def _is_enabled(self, transition: Compiled) -> bool:
-        """Enabled by what is known.
+        """Enabled by the image, and by what the signals show where a promise keeps that out of the image.
 
-        A sensor untold since the restart closes its gates, unless a promise holds it; a token whose command is not
-        sent yet is not taken.
+        A sensor untold since the restart closes its gates; a token whose command is not sent yet is not taken.
         """
-        if transition.takes & self.unsent:
+        if transition.takes & self.unsent or transition.reads & self.untold:
             return False
-        if self.untold and transition.reads & self.untold & ~self._locked_reads():
-            return False
-        return transition.enabled(self.word)
+        return transition.enabled(self.word) and (not self.latched or transition.enabled(self._shown()))
+
+    def _shown(self) -> Word:
+        """The word with the values in it that promises keep out."""
+        word = self.word
+        for signal, value in self.latched.items():
+            bit = self.player.signal_bit(signal)
+            word = word | bit if value else word & ~bit
+        return word
 
     def _uncommanded(self) -> Word:
         """The places with a time limit for whose completion no command was sent: a token there came with the start."""
@@ -479,7 +486,7 @@ class LocalController:
         ready = 0 if self.held or self.leaving else self.enabled.at(self.word) & above.mask
         if self.forgone:
             ready &= ~self.forgone
-        if self.untold or self.unsent:
+        if self.untold or self.unsent or self.latched:
             ready = sum(1 << t for t in bits(ready) if self._is_enabled(self.transitions[t]))
         if self.promises and ready & self.free_mask:
             disturbing = (t for t in bits(ready & self.free_mask) if self._disturbs_promises(self.transitions[t]))

@@ -47,6 +47,7 @@ from firable.nets.net import (
     SignalKind,
     Transition,
 )
+from firable.nets.text import parse_net
 from firable.semantics.player import Player
 
 SMALL = [
@@ -192,6 +193,57 @@ def test_promise_holds_a_local_transition_back_until_the_abort() -> None:
     assert beside_keeping(controller.fire()) == []
     decided(controller, 0, None)
     assert beside_keeping(controller.fire()) == [Firing("l")]
+
+
+GUARDED = """
+firable: 1
+cell: guarded
+controllers:
+  a: {start: x, places: {x: , y: }}
+  b: {start: x, places: {x: , y: }}
+  c:
+    start: idle
+    inputs: [guard]
+    places: {idle: , busy: }
+transitions:
+  enters: {from: a.x, to: a.y, if: c.guard}
+  also_enters: {from: b.x, to: b.y, if: c.guard}
+  begins: {from: c.idle, to: c.busy, if: c.guard}
+"""
+
+
+def test_guard_that_opens_during_a_promise_stays_closed_for_its_commit_and_for_nothing_else() -> None:
+    controller = LocalController(split(parse_net(GUARDED)), "c")
+    controller.read("c.guard", value=True)
+    asked(controller, 0, "enters")
+    assert controller.may_fire
+    assert controller.read("c.guard", value=False) == []
+    assert beside_keeping(controller.fire()) == []
+    votes = [vote for vote in asked(controller, 1, "also_enters") if isinstance(vote, Vote)]
+    assert [(vote.promised, vote.readiness.transitions) for vote in votes] == [(frozenset(), frozenset())]
+    assert Taken("c.guard", value=False) in decided(controller, 0, "enters")
+    assert beside_keeping(controller.fire()) == []
+    controller.read("c.guard", value=True)
+    assert beside_keeping(controller.fire()) == [Firing("begins")]
+
+
+@pytest.mark.parametrize("shown", [(), (False,)], ids=["nothing shown", "open"])
+def test_guard_that_a_promise_reads_is_open_after_a_restart_until_it_is_seen_closed(shown: tuple[bool, ...]) -> None:
+    decomposition = split(parse_net(GUARDED))
+    controller = LocalController(decomposition, "c")
+    effects = [*controller.start(), *controller.read("c.guard", value=True)]
+    effects += controller.receive(VoteRequest("c", 0, ("enters",), 0, -1))
+    kept = {effect.key: effect.value for effect in effects if isinstance(effect, Keep) and effect.value is not None}
+    again = LocalController.restored(decomposition, "c", kept)
+    again.start()
+    for value in shown:
+        again.read("c.guard", value)
+    again.resume()
+    assert again.promises
+    assert beside_keeping(again.fire()) == []
+    decided(again, 0, None)
+    again.read("c.guard", value=True)
+    assert beside_keeping(again.fire()) == [Firing("begins")]
 
 
 def test_commit_without_a_promise_is_refused() -> None:
