@@ -16,27 +16,22 @@ from functools import partial
 from time import perf_counter
 from typing import Final
 
-from firable.analysis._engine import BudgetExceeded, IncompleteGraph, MarkingSet, Stubborn
-from firable.analysis.compiled import Row, engine_limits, rows
+from firable.analysis._engine import BudgetExceeded, IncompleteGraph
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.question import Known, no
 from firable.analysis.race import Contestant, race
 from firable.analysis.reduction.components import parts
 from firable.analysis.reduction.reduce import reduce_for_goal, reduce_for_liveness
-from firable.analysis.spaces.space import WitnessError, Witnesses
 from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.analysis.stubborn import METHOD, decide_by_stubborn_sets, find_firings
-from firable.analysis.walk import SEED, decide_by_walk
-from firable.nets.formula import Constant, Deadlock, Formula
+from firable.analysis.walk import decide_by_walk
+from firable.nets.formula import Constant, Formula
 from firable.nets.net import Net
-from firable.nets.verdict import Cost, Witness
-from firable.semantics.trace import Discipline
+from firable.nets.verdict import Cost
 
 DIAGRAM: Final = "decision diagram"
 _REDUCING_SHARE: Final = 0.75
 _WALKED_FIRST: Final = 2**18
-_WALKED_SECONDS: Final = 5.0
-_WALKED_FIRINGS: Final = 2**24
 _ALONE_FIRST: Final = 2**12
 """Markings that stubborn sets search before a diagram is made beside."""
 
@@ -131,35 +126,11 @@ def decide_by_diagram(net: Net, goal: Formula, limits: Limits) -> Finding:
         space = explore_symbolically(net, limits)
         found = space.satisfying(goal)
         reachable = bool(found)
-        witness = None
-        if reachable:
-            witness = (_walked(net, found, limits) if goal == Deadlock() else None) or space.witness(found)
+        witness = space.witness(found)
     except BudgetExceeded as error:
         return Finding(None, DIAGRAM, bound=str(error), cost=Cost(seconds=perf_counter() - began))
     cost = Cost(space.n_markings, seconds=perf_counter() - began)
     return Finding(reachable, DIAGRAM, witness, cost=cost)
-
-
-def _walked(net: Net, deadlocks: MarkingSet, limits: Limits) -> Witness | None:
-    """A way to a deadlock, if walks towards one of a set meet it or another soon.
-
-    The diagram knows many deadlocks and not the way to any, which may take longer to find than all markings. Walks that
-    know where to go mostly do not: they are drawn to a transition that would fire nowhere but in that deadlock.
-    """
-    n_places, transitions, initial = rows(net)
-    marked = set(deadlocks.any() or ())
-    probe: Row = ([], [], sorted(marked), [p for p in range(n_places) if p not in marked], [])
-    engine = Stubborn(n_places, [*transitions, probe], initial)
-    until = engine_limits(limits.deadline.within(_WALKED_SECONDS))
-    ways, met, _ = engine.cover([len(transitions)], seed=SEED, max_steps=_WALKED_FIRINGS, **until)
-    if met is None and not ways:
-        return None
-    witnesses = Witnesses(net, Discipline.INTERLEAVING)
-    firings = [(t,) for t in (ways[0][1] if met is None else met)]
-    reached = witnesses.play(net.initial_marking, firings)
-    if not witnesses.player.deadlocked(reached):
-        raise WitnessError("a walk to a deadlock ends in a marking that is none")
-    return witnesses.named(firings, reached)
 
 
 def known_by_reduction(net: Net, limits: Limits) -> Mapping[str, Known]:

@@ -127,6 +127,27 @@ def test_a_deadlock_many_firings_away_is_walked_to() -> None:
     assert Player(net).deadlocked(net.marking(witness.marking))
 
 
+def held_back(machines: int, steps: int) -> Net:
+    """Machines in a ring that step on alone; one that has finished begins anew unless the next has finished too."""
+    places, transitions = [], []
+    for i in range(machines):
+        own = [f"m{i}.s{k}" for k in range(steps)]
+        places += [Place(name, marked=name == own[0]) for name in own]
+        transitions += [Transition(f"m{i}_steps_{k}", (a,), (b,)) for k, (a, b) in enumerate(pairwise(own))]
+        next_last = f"m{(i + 1) % machines}.s{steps - 1}"
+        transitions.append(Transition(f"m{i}_begins_anew", (own[-1],), (own[0],), inhibitive=(next_last,)))
+    return Net("held_back", tuple(places), tuple(transitions))
+
+
+def test_a_deadlock_that_one_of_a_thousand_million_markings_is_comes_with_a_short_way() -> None:
+    machines, steps = 10, 8
+    space = explore_symbolically(held_back(machines, steps))
+    assert (space.n_markings, space.count(space.deadlocks)) == (steps**machines, 1)
+    witness = space.witness(space.deadlocks)
+    assert witness is not None
+    assert machines * (steps - 1) <= len(witness.firings) <= machines * steps
+
+
 @given(net=ring_nets(signals=True))
 def test_near_firing_sequences_are_shortest(net: Net) -> None:
     graph, space = explore(net), explore_symbolically(net)

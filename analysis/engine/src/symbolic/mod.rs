@@ -6,7 +6,7 @@
 //! reachability by saturation (`saturation`, `firing`), which takes several places at once (`blocks`, `values`,
 //! `parts`), on a net whose places were merged (`merging`, `trial`) and are told apart in what is found (`standing`), one
 //! step of all transitions (`image`), runs that go on for ever (`endless`), exact numbers (`count`, `passing`), firing
-//! sequences (`walk`), sets as rows for others to read (`listing`), and what is found of a net as one value (`space`,
+//! sequences (`walk`, `blockwise`), sets as rows for others to read (`listing`), and what is found of a net as one value (`space`,
 //! `ordered`).
 //!
 //! Everything is written with stacks of its own, because nets have half a million levels, and everything that grows
@@ -16,6 +16,7 @@
 mod abreast;
 pub mod algebra;
 mod blocks;
+mod blockwise;
 pub mod cache;
 pub mod count;
 mod endless;

@@ -64,7 +64,8 @@ impl Racer {
             none => {
                 let mut ordered = Ordered::new(transitions, initial, &self.order, room)?;
                 let start = ordered.single(initial)?;
-                let search = Saturation::new(&ordered.diagram, &ordered.blocks, start, ANY, By::Forward)?;
+                let to = ordered.blocks.len() as u32;
+                let search = Saturation::new(&ordered.diagram, &ordered.blocks, (start, ANY), to, By::Forward)?;
                 none.insert((ordered, search, start))
             }
         };

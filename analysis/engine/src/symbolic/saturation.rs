@@ -132,13 +132,20 @@ impl Workshop<'_> {
 }
 
 impl Saturation {
-    /// The closure of a set under the events of an agenda, within a constraint (`ANY`: none).
+    /// The closure of a set of what lies up to a block under the events up to there of an agenda, within a constraint
+    /// (`ANY`: none).
     ///
     /// The agenda is that of what it goes by. All of the set outside the constraint is left out.
-    pub(super) fn new(diagram: &Diagram, blocks: &Blocks, set: Node, within: Node, by: By) -> Result<Self, Stop> {
+    pub(super) fn new(
+        diagram: &Diagram,
+        blocks: &Blocks,
+        (set, within): (Node, Node),
+        to: u32,
+        by: By,
+    ) -> Result<Self, Stop> {
         let mut frames = Vec::new();
         let from = blocks.of(diagram.store.level(set));
-        diagram.store.memory.push(&mut frames, Frame::Close { from, to: blocks.len() as u32, within })?;
+        diagram.store.memory.push(&mut frames, Frame::Close { from, to, within })?;
         let step = Step::Fire { suffix: SATURATE, node: set, within };
         Ok(Saturation { frames, values: Vec::new(), step, by, events: 0 })
     }

@@ -4,6 +4,7 @@
 //! name, as it is the caller who knows which sets are still wanted.
 
 use super::algebra::{Binary, Diagram};
+use super::blocks::Blocks;
 use super::cache::ANY;
 use super::count::{self, Natural};
 use super::events::{Suffix, Table};
@@ -14,7 +15,7 @@ use super::passing::passing;
 pub use super::saturation::By;
 use super::saturation::{Saturation, Workshop};
 use super::walk::{LAYERS_WORK, Walk};
-use super::zdd::{EMPTY, Node};
+use super::zdd::{EMPTY, Node, Store};
 use crate::budget::{Stop, Watch};
 use crate::net::Transition;
 
@@ -84,6 +85,14 @@ impl Symbolic {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         self.ordered.diagram.store.memory.used()
+    }
+
+    pub(super) fn store(&self) -> &Store {
+        &self.ordered.diagram.store
+    }
+
+    pub(super) fn blocks(&self) -> &Blocks {
+        &self.ordered.blocks
     }
 
     /// The place of each level but 0.
@@ -259,28 +268,29 @@ impl Symbolic {
         by: By,
         watch: &mut Watch<'_>,
     ) -> Result<Node, Stop> {
-        Ok(self.closure_within(roots, (set, within), by, u64::MAX, watch)?.unwrap_or(EMPTY))
+        let all = self.blocks().len() as u32;
+        self.closure_up_to(roots, (set, within), by, all, watch)
     }
 
-    /// The same with so many results computed at most; None where it needs more.
-    pub(super) fn closure_within(
+    /// The same of sets of what lies up to a block, under the firings that have nothing to do with what lies above it.
+    pub(super) fn closure_up_to(
         &mut self,
         roots: &[Node],
         (set, within): (Node, Node),
         by: By,
-        work: u64,
+        block: u32,
         watch: &mut Watch<'_>,
-    ) -> Result<Option<Node>, Stop> {
+    ) -> Result<Node, Stop> {
         let held = [set, if within == ANY { EMPTY } else { within }];
         self.again(roots, &held, |space, roots| {
             space.ordered.agenda(by, &space.transitions)?;
             let Ordered { diagram, blocks, parts, agendas, .. } = &mut space.ordered;
-            let Some(agenda) = &agendas[by as usize] else { return Ok(Some(EMPTY)) };
-            let mut search = Saturation::new(diagram, blocks, set, within, by)?;
+            let Some(agenda) = &agendas[by as usize] else { return Ok(EMPTY) };
+            let mut search = Saturation::new(diagram, blocks, (set, within), block, by)?;
             let mut shop = Workshop { diagram, blocks, parts, agenda, roots };
-            let result = search.run(&mut shop, work, watch);
+            let result = search.run(&mut shop, u64::MAX, watch);
             search.finish(diagram);
-            result
+            Ok(result?.unwrap_or(EMPTY))
         })
     }
 
