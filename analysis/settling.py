@@ -108,6 +108,15 @@ class Settling:
             self._settle(_QUESTIONS[name], known.answer, known.method, Cost(seconds=0.0))
         self._pass_on(decided | self.found)
 
+    def may_ask(self, verdict: Verdict, fired: Collection[str]) -> bool:
+        """Whether `ask` has anything to ask: the verdict comes down to goals, not too many, a formula or a bound."""
+        if (asked := self._goals(verdict, fired)) is not None:
+            return len(asked[1]) <= _GOALS_MAX
+        return self._formula_of(verdict.name) is not None or self._bound_of(verdict.name) is not None
+
+    def _goals(self, verdict: Verdict, fired: Collection[str]) -> tuple[Question, tuple[Goal, ...]] | None:
+        return goals_of(self.net, verdict.name, fired) or query_goals(self.queries, verdict)
+
     def ask(
         self,
         verdict: Verdict,
@@ -122,7 +131,7 @@ class Settling:
         """
         if verdict.name in self.found or not lanes:
             return
-        asked = goals_of(self.net, verdict.name, fired) or query_goals(self.queries, verdict)
+        asked = self._goals(verdict, fired)
         if asked is None:
             self._by_formula(verdict, lanes, deadline, slices_seconds)
             return
@@ -167,9 +176,7 @@ class Settling:
         self, verdict: Verdict, lanes: Lanes, deadline: Deadline, slices_seconds: Sequence[float] | None
     ) -> None:
         """Settle the verdict on an upper bound of tokens."""
-        bounds = (query for query in self.queries if query.kind is QueryKind.BOUND)
-        query = next((query for query in bounds if f"query.{query.name}" == verdict.name), None)
-        if query is None:
+        if (query := self._bound_of(verdict.name)) is None:
             return
 
         def reached(goal: Formula) -> Finding | None:
@@ -222,6 +229,11 @@ class Settling:
             if name == f"property.{of.name}" and isinstance(of, TemporalProperty):
                 return of.formula, of.logic
         return None
+
+    def _bound_of(self, name: str) -> Query | None:
+        """The query for an upper bound of tokens, by the name of its verdict."""
+        bounds = (query for query in self.queries if query.kind is QueryKind.BOUND)
+        return next((query for query in bounds if f"query.{query.name}" == name), None)
 
     def _pass_on(self, decided: Mapping[str, Verdict]) -> None:
         """Answer the queries that ask for what a verdict on the net says."""
