@@ -126,8 +126,7 @@ class Groups:
         Returns a sentence where that had to be given up. Raises `InputError` F1017 or F5034 where it fails.
         """
         self.run.recorder.may_write |= self.run.acquaintances.is_alive
-        has_news = self.run.link is not None or not self.run.dispatch.is_taken_kept
-        sync = self.run.journal.sync() if has_news and self.storing is None else None
+        sync = self.run.journal.sync() if self.storing is None else None
         if last := [one for one in (sync, self.run.recorder.writing()) if one is not None]:
             storing = asyncio.get_running_loop().run_in_executor(None, _store, last)
             if await uncut([storing], patience):

@@ -17,6 +17,9 @@ machine by itself (EN ISO 13850, 4.1.4).
 The process ends as before where nobody could reset it; where the end was asked for as well; where something failed
 besides: a fault, a driver that hangs. Where a device has not confirmed its safe outputs it stays, and goes on trying.
 
+The journal holds an emergency stop until it is reset, or the process has ended in order. So what follows one that was
+killed meanwhile begins latched, too; and where nobody can reset it there, held, whatever was said beforehand.
+
 Rejected: to go on with the machines of the protocol as they are, held anew. It is shorter, and a second way back that
 must be right in every marking. Rejected: a fault that latches likewise. A fault is of the program or of a device that
 does not do what it should, and a new process is the better answer.
@@ -32,13 +35,17 @@ from typing import TYPE_CHECKING, Final
 
 from firable.executor.drivers.driver import Latched
 from firable.executor.operating import restart
+from firable.executor.operating.recorder import TRACE
 from firable.executor.operating.situation import Situation, State
+from firable.executor.protocol.messages import Keep
 
 if TYPE_CHECKING:
     from firable.executor.operating.host import Host
 
 LATCHED: Final = "latched"
 """The kind of note of what is to be done before a reset."""
+_EMERGENCY: Final = "emergency"
+"""Under this the journal has why there was an emergency stop, beside the trace."""
 _LOOK_SECONDS: Final = 0.2
 """So often it is looked for what is against a reset."""
 
@@ -52,6 +59,26 @@ class Latch:
     unconfirmed: Collection[str] = ()
     """The devices that had not confirmed the safe outputs when the life before ended."""
     was_reset: asyncio.Event = field(default_factory=asyncio.Event)
+
+
+def keep(run: Host, reason: str | None) -> None:
+    """Have the journal hold that there was an emergency stop, or with None that there is none any more."""
+    if run.journal.kept(TRACE).get(_EMERGENCY) != reason:
+        run.journal.write(TRACE, [Keep(_EMERGENCY, reason)])
+
+
+def go_on(run: Host) -> None:
+    """Begin as the process before has left it, if that was killed after an emergency stop and before the reset."""
+    reason = run.journal.kept(TRACE).get(_EMERGENCY)
+    if reason is None:
+        return
+    run.said = {}
+    if run.latched is not None and (run.served or run.operated):
+        run.driver = driver = run.latched()
+        run.latch = Latch(str(reason), driver, tuple(driver.undriven))
+    else:
+        run.tell_operator(LATCHED, f"emergency stop: {reason}; it was not reset before the process was killed")
+    run.begin(resume=False)
 
 
 def may_stay(run: Host) -> bool:
@@ -83,6 +110,7 @@ def reset(run: Host) -> tuple[str, ...]:
     run.latch.was_reset.set()
     run.latch = None
     run.emergency = None
+    keep(run, None)
     run.note("reset")
     return ()
 

@@ -29,6 +29,7 @@ async def to_the_end(run: Host) -> Situation:
     operator = [] if run.operator is None else [asyncio.create_task(run.operate(run.operator), name="operator")]
     for task in operator:
         task.add_done_callback(run.task_ended)
+    latch.go_on(run)
     try:
         while (ended := await _live(run)) is None:
             for task in operator:
@@ -39,6 +40,7 @@ async def to_the_end(run: Host) -> Situation:
     ended = ending.with_hanging(ended, hanging)
     if run.left_nothing_open:
         run.recorder.end(run.now_seconds(), run.marking, ended.state.value)
+    latch.keep(run, None)
     try:
         if unwritten := await run.groups.write_last(run.patience):
             run.tell_operator("fault", unwritten)  # before anybody waits for its thread

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from firable.executor.operating import ending
+from firable.executor.operating import ending, latch
 
 if TYPE_CHECKING:
     from firable.executor.operating.host import Host
@@ -51,6 +51,7 @@ def emergency_stop(run: Host, reason: str) -> None:
     """Drive the safe outputs at once, before anything is written or said; it can be reset, or the run ends."""
     run.make_safe()
     run.emergency = reason
+    latch.keep(run, reason)
     run.peers.meeting.set()  # a driver that has waited for others waits no longer
     _end_soon(run, "emergency stop", reason=reason)
 

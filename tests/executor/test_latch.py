@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import copy
 import io
 import time
 from collections.abc import Awaitable, Callable
@@ -14,8 +15,9 @@ from support.served_cells import DECOMPOSITION, NET, Served, served
 from firable.executor.drivers.bench import until
 from firable.executor.drivers.bound import bound_driver
 from firable.executor.drivers.dry_run import DryRunDriver
+from firable.executor.journal.journal import MemoryJournal
 from firable.executor.operating.host import Host
-from firable.executor.operating.recorder import Recorder
+from firable.executor.operating.recorder import KEY, TRACE, Recorder
 from firable.executor.operating.restart import uncertain
 from firable.executor.operating.service import patience_with
 from firable.executor.operating.situation import Situation, State
@@ -217,5 +219,63 @@ def test_latched_run_is_not_resumed_before_it_is_reset_and_may_be_latched_again(
         situation = await run
         assert (situation.state, situation.message) == (State.STOPPED, "emergency stop: a person")
         assert situation.is_emergency
+
+    asyncio.run(main())
+
+
+def on(journal: MemoryJournal) -> Host:
+    """The net on machines that take all they are given, gone on with from a journal; to be resumed beforehand."""
+    subnets, kept = DECOMPOSITION.subnets, journal.kept(TRACE).get(KEY)
+    return Host(
+        DECOMPOSITION,
+        DryRunDriver(subnets, 0.01),
+        Recorder(NET, net_digest(NET), None, kept),
+        journal=journal,
+        resume=True,
+        latched=lambda: DryRunDriver(subnets, 0.01),
+    )
+
+
+def test_emergency_stop_outlives_a_process_that_is_killed_before_the_reset() -> None:
+    async def killed() -> MemoryJournal:
+        """What the journal holds at a moment after the emergency stop."""
+        host = on(journal := MemoryJournal())
+        host.served = True
+        run = asyncio.create_task(host.main())
+        await until(lambda: sum(host.recorder.firings.values()) > 5, "firings")
+        host.emergency_stop("a person")
+        await until(lambda: host.situation().state is State.LATCHED, "the latch")
+        then = copy.deepcopy(journal)
+        host.stop()
+        await run
+        return then
+
+    async def main() -> None:
+        journal = await killed()
+        alone = on(copy.deepcopy(journal))
+        fired = sum(alone.recorder.firings.values())
+        situation = await asyncio.wait_for(alone.main(), 60)
+        assert (situation.state, sum(alone.recorder.firings.values())) == (State.HELD, fired)
+        host = on(journal)
+        host.served = True
+        run = asyncio.create_task(host.main())
+        await until(lambda: host.situation().state is State.LATCHED, "the latch")
+        assert "a person" in host.situation().message
+        assert not host.resume()
+        assert host.reset() == ()
+        await until(lambda: host.taking_up is not None and host.taking_up.is_final, "the answers of the machines")
+        assert host.situation().state is State.HELD
+        assert sum(host.recorder.firings.values()) == fired
+        await until(lambda: host.is_quiet, "that the reset is durable")
+        again = on(copy.deepcopy(journal))
+        again.served = True
+        assert host.resume()
+        await until(lambda: sum(host.recorder.firings.values()) > fired, "that it goes on")
+        host.stop()
+        await run
+        run = asyncio.create_task(again.main())
+        await until(lambda: sum(again.recorder.firings.values()) > fired, "that one that was reset goes on")
+        again.stop()
+        await run
 
     asyncio.run(main())
