@@ -1,7 +1,8 @@
 """The firing rule: Eq. (1)-(4) of the paper, with the corrections of SEMANTICS, over any Boolean algebra.
 
-This is the only text of the rule in Python. The player, the analyses' columns, the SMT encodings and the obligations of
-the decomposition are evaluations of these functions; the Rust engine is the fast copy and is tested against them.
+This is the reference. The player, the analyses' columns, the SMT encodings and the obligations of the decomposition
+are evaluations of these functions; the Rust engine and the executor's token player are fast copies, tested against
+them.
 
 Places and signals are read through functions from an index to a value of the algebra, so that a caller decides what
 a marking is: a bit mask, a row of columns, a list of solver variables.

@@ -36,7 +36,7 @@ from firable.nets.bundle import file_stem
 from firable.nets.diagnostics import InputError
 from firable.nets.interchange import canonical_json, net_from_json, net_to_json
 from firable.nets.net import Net
-from firable.nets.tasks.model import Catalogue, Task
+from firable.nets.tasks.model import Catalogue
 from firable.nets.tasks.printing import as_written
 from firable.nets.tasks.text import parse_tasks
 from firable.nets.verdict import NOTHING, Status, Verdict, Weight
@@ -256,8 +256,3 @@ def _judge(
 def without_the_rest(net: Net) -> Net:
     """A conceptual net without what is no matter of the refinement: its properties and arbiters."""
     return replace(net, properties=(), arbiters=())
-
-
-def document_net(task: Task) -> Net:
-    """The net that the document on a task is about."""
-    return ClosedTask(task).net

@@ -22,8 +22,6 @@ from firable.nets.net import Net
 from firable.semantics.joining import APPLIED
 from firable.semantics.trace import CommandSent, Event, Fired, Noted, SignalChanged
 
-CONTENT_TYPE: Final = "text/plain; version=0.0.4; charset=utf-8"
-
 _FAULTS: Final = ("fault", "divergence", "emergency stop")
 _CYCLE_SECONDS: Final = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 45, 60, 90, 120, 300, 600, 1800, 3600)
 

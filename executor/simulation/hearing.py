@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Final, TypeVar
+from typing import TypeVar
 
 from firable.executor.protocol.coordinator import Coordinator, Round
 from firable.executor.protocol.messages import (
@@ -53,7 +53,6 @@ class Setting:
     beside: Beside | None = None
 
 
-NOTHING_ELSE: Final = Setting()
 T = TypeVar("T", bound=ToCoordinator)
 
 
