@@ -103,27 +103,27 @@ class Peers:
             c for each in acts.coordinators.values() for took_part in each.participants.values() for c in took_part
         }
         self.needed = tuple(sorted(self.deciding | (voting - here)))
-        """Those that some machine here talks to."""
+        """The machines of other hosts that one here exchanges messages with."""
         self.connected_to: set[str] = set()
         self.met: set[str] = set()
         self.standing = Standing.GOING
-        self.stand_still: dict[str, Standing] = {}
-        """Those of them on whose hosts nothing moves, and why."""
+        self.standing_peers: dict[str, Standing] = {}
+        """Of these, those whose host is paused, held or latched, and which of it."""
         self.meeting = asyncio.Event()
         self.turned_away: dict[str, str] = {}
         """What is said of each that was refused and has not come back as it should."""
-        self.unfit: set[tuple[str, ...]] = set()
-        """The machines of each host that was refused and has not gone since."""
-        self.elsewhere: dict[str, str] = {}
-        """The machines here that another host was let in with, and in a phrase the third one that has said so last."""
+        self.refused_hosts: set[tuple[str, ...]] = set()
+        """The hosts that were refused and are still there, each by its machines."""
+        self.rival_let_in_by: dict[str, str] = {}
+        """For each machine here that a rival host runs too: the third host that has let the rival in, in a phrase."""
         self.is_hands_off = False
         """Whether the machines here are left alone, because another host may have them."""
         self.hands_off_until_seconds = 0.0
         """When they no longer are, if nobody is known to have them then."""
-        self.parted: set[str] = set()
-        """Those of them that the host had which was refused and has gone last."""
-        self.unlike: set[str] = set()
-        """Those that were met with another bundle or version, and not with this one since."""
+        self.left_by_rival: set[str] = set()
+        """Those of the machines here that the rival which left last was running as well."""
+        self.of_other_release: set[str] = set()
+        """The machines elsewhere that were last met with another bundle or version than the one here."""
         self.hopeless: asyncio.TimerHandle | None = None
         """What ends a host that can do nothing without those."""
         self.keep_due_seconds = 0.0
@@ -163,7 +163,7 @@ class Peers:
     @property
     def claimed(self) -> tuple[str, ...]:
         """The controllers here whose machines another host has, as far as is known."""
-        theirs = set(self.elsewhere).union(*self.unfit)
+        theirs = set(self.rival_let_in_by).union(*self.refused_hosts)
         return tuple(sorted(theirs.intersection(self.acts.controllers)))
 
     async def let_drive(self, is_urgent: Callable[[], bool]) -> None:
@@ -238,13 +238,13 @@ class Peers:
 
     def _left_alone(self, *, is_over: bool) -> Iterator[str]:
         """That the machines here are left alone, why, until when, and what is to be done where that never comes."""
-        if said := sorted(self.elsewhere.keys() & self.acts.controllers):
-            by = " and ".join(dict.fromkeys(self.elsewhere[name] for name in said))
+        if said := sorted(self.rival_let_in_by.keys() & self.acts.controllers):
+            by = " and ".join(dict.fromkeys(self.rival_let_in_by[name] for name in said))
             why, until = f"{by} has let another one in with {all_called(said)}", " itself"
         elif claimed := self.claimed:
             why, until = f"another host has {all_called(claimed)}", f", or that has been gone for {PARTED_SECONDS:g} s"
-        elif self.parted:
-            why = f"the host that had {all_called(sorted(self.parted))} is gone, or a line to it is broken"
+        elif self.left_by_rival:
+            why = f"the host that had {all_called(sorted(self.left_by_rival))} is gone, or a line to it is broken"
             until = f", or that has been gone for {PARTED_SECONDS:g} s"
         else:
             why = f"another host may have {all_called(self.acts.controllers)}"
@@ -268,7 +268,7 @@ class Peers:
         for name in self.needed:
             if name in self.met and name not in self.connected_to:
                 yield f"{called(name)} is not connected"
-            elif (standing := self.stand_still.get(name)) is not None:
+            elif (standing := self.standing_peers.get(name)) is not None:
                 yield f"{called(name)} {standing.phrase}"
 
     @property
@@ -319,7 +319,7 @@ class Peers:
             self.met.add(peer)
             self.meeting.set()
             self.turned_away.pop(peer, None)
-            self.unlike.discard(peer)
+            self.of_other_release.discard(peer)
             self.told("connected", f"{called(peer)} is connected")
             self._say_again()
 
@@ -338,7 +338,7 @@ class Peers:
         """A peer can no longer be reached."""
         if peer in self.names:
             self.connected_to.discard(peer)
-            self.stand_still.pop(peer, None)
+            self.standing_peers.pop(peer, None)
             self._keep_ages()
             waiting = [sentence for sentence in self.waits() if reached(peer, {peer}) in sentence]
             self.told("lost", "; ".join([f"{called(peer)} is lost", *waiting]))
@@ -346,9 +346,9 @@ class Peers:
     def stands(self, peer: str, standing: Standing) -> None:
         """The host of a peer has been paused, say, or goes on."""
         if peer in self.names:
-            self.stand_still[peer] = standing
+            self.standing_peers[peer] = standing
             if standing is Standing.GOING:
-                del self.stand_still[peer]
+                del self.standing_peers[peer]
             self.told("standing", f"{called(peer)} {standing.phrase}")
 
     def refused(self, peers: Sequence[str], why: Refusal) -> None:
@@ -357,26 +357,26 @@ class Peers:
         is_third = bool(theirs) and self.here.isdisjoint(peers)
         refused = f"this host is refused by {who}" if is_third else f"{who} is refused"
         self._turn_away(peers, f"{refused}: {why.problem.message}; {why.problem.hint}")
-        self.unfit.add(tuple(peers))
+        self.refused_hosts.add(tuple(peers))
         if is_third:
-            self.elsewhere |= dict.fromkeys(theirs, who)
+            self.rival_let_in_by |= dict.fromkeys(theirs, who)
         self.meeting.set()
         if why.are_unlike:
-            self.unlike.update(peers)
+            self.of_other_release.update(peers)
             if self._is_hopeless and self.hopeless is None:
                 loop = asyncio.get_running_loop()
                 self.hopeless = loop.call_later(MEET_SECONDS, self._end_if_hopeless, why.problem)
 
     def gone(self, peers: Sequence[str]) -> None:
         """A host that was refused is gone; what it had it may have left in the middle of something."""
-        self.unfit.discard(tuple(peers))
+        self.refused_hosts.discard(tuple(peers))
         if parted := self.acts.controllers.keys() & set(peers):
-            self.parted = parted
+            self.left_by_rival = parted
             self.hands_off_until_seconds = asyncio.get_running_loop().time() + PARTED_SECONDS
-        gone = set(peers).difference(*self.unfit)  # some may be those of another host that is there
+        gone = set(peers).difference(*self.refused_hosts)  # some may be those of another host that is there
         for name in gone:
             self.turned_away.pop(name, None)
-        self.unlike -= gone
+        self.of_other_release -= gone
         self.told("gone", f"the host of {all_called(peers)} that was refused is gone")
         self.meeting.set()
 
@@ -384,7 +384,7 @@ class Peers:
     def _is_hopeless(self) -> bool:
         """Whether nobody ever let this host in, and all who decide for it are unlike it."""
         is_top = COORDINATOR in self.acts.coordinators
-        return self.is_unmet and not is_top and bool(self.deciding) and self.deciding <= self.unlike
+        return self.is_unmet and not is_top and bool(self.deciding) and self.deciding <= self.of_other_release
 
     def _end_if_hopeless(self, problem: Diagnostic) -> None:
         self.hopeless = None
