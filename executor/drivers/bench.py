@@ -56,7 +56,7 @@ devices:
     heartbeat: {{write: {beat}, every_s: 0.05, tripped: {tripped}}}
     safe: {{{output}: false}}
     channels:
-      M: {{{out}, taken: {taken}, done: {done}, failed: {failed}}}
+      M: {{{out}, {shown}done: {done}, failed: {failed}}}
 {emergency}
 signals:
   M.held: {{device: D, read: {sensor}, on_loss: hold}}
@@ -153,6 +153,8 @@ class Bench:
     """Whether the binding has the button of the machine as its emergency stop."""
     latched: bool = False
     """Whether the driver follows an emergency stop."""
+    shows_taken: bool = True
+    """Whether the channel of the machine shows what it has taken."""
     driver: BoundDriver = field(init=False)
     heard: Heard = field(init=False)
 
@@ -168,6 +170,7 @@ class Bench:
         text = _BINDING.format(
             keys="\n    ".join(self.far.keys.split(", ")),
             out=out,
+            shown=f"taken: {points['taken']}, " if self.shows_taken else "",
             needed=self.needed,
             start_s=self.start_s,
             timeout_s=self.timeout_s,

@@ -14,7 +14,8 @@ bits for request and done, with their four edges for each command. They know no 
 a device that has nothing else is spoken to by `handshake.py`.
 
 The device *has* a command when it shows its number. Of a channel that shows nothing of what it has taken, the
-confirmation of the write must do; behind a broker that is the broker's word alone.
+confirmation of the write must do; behind a broker that is the broker's word alone. What it has is not written again: a
+command is given once, and is no level that would have to be held as long as its token stays.
 
 A channel is for one machine, which does one thing at a time. A command that overtakes another, such as a stop, has no
 completion. Pure: a machine of calls and answers, without clock and connection.
@@ -89,7 +90,7 @@ class Channel:
         self.untaken: dict[int, Order] = {}
         """What was sent, by its number, and the device is not known to have."""
         self.is_taken = False
-        """Whether the device has shown the number of the newest order."""
+        """Whether the device has the newest order: it has shown its number, or confirmed it where it shows none."""
         self.is_withdrawn = False
         """Whether the newest order is not to be written again, should its connection fail before the device has it."""
         self.failed_before: int | None = None
@@ -165,6 +166,7 @@ class Channel:
             return ()
         self.phase = _Phase.WRITTEN
         if self.document.taken is None:
+            self.is_taken = True
             return self._has(order.number)
         shown = [key for key, number in self.shown.items() if number == order.number]  # also from before it was written
         return tuple(outcome for key in shown for outcome in self.shows(key, order.number))
@@ -172,7 +174,9 @@ class Channel:
     def shows(self, key: str, value: Value) -> tuple[Outcome, ...]:
         """The device shows a number; returns what that tells."""
         number = self.shown[key] = as_number(value)
-        if self.current is not None and number == self.current.number:
+        if (order := self.current) is not None and number == order.number:
+            if self.phase is _Phase.HELD and self.untaken.get(number) is order:  # brought late by the connection before
+                self.phase = _Phase.WRITTEN
             self.is_taken |= self.phase in {_Phase.WRITING, _Phase.WRITTEN}
         if key == "failed" and number != self.failed_before:
             self.failed_before = None
@@ -188,7 +192,8 @@ class Channel:
     def connected_again(self) -> Order | None:
         """A new connection shows its numbers; returns an order that the device had, and knows nothing of any more.
 
-        What the device may not have is written again, with its number: a device that has it ignores it.
+        What the device may not have is written again, with its number: a device that has it ignores it. What it has is
+        not: one that was switched off and on would begin anew, hours later and by no token.
         """
         order = self.current
         if order is None or self.phase is _Phase.HELD:
@@ -199,8 +204,9 @@ class Channel:
             self.current, self.phase = None, _Phase.WRITTEN
         elif not self.is_taken:
             self.phase = _Phase.HELD
-        elif self.document.taken is not None:
-            return self.outstanding.pop(order.number, None)
+        else:
+            self.phase = _Phase.WRITTEN
+            return None if self.document.taken is None else self.outstanding.pop(order.number, None)
         return None
 
     def forgotten(self) -> Order | None:

@@ -17,6 +17,8 @@ imported, so that who runs a cell need not have it.
 
 from __future__ import annotations
 
+from functools import partial
+
 from firable.executor.drivers.bench import QUICK_S, Bench, until
 from firable.executor.drivers.conformance_stopping import StoppingConformance
 from firable.executor.drivers.driver import Quality
@@ -270,6 +272,29 @@ class DriverConformance(StoppingConformance):
             assert len(b.machine.orders) == 1
 
         self.bench(test, timeout_s=QUICK_S)
+
+    def test_a_command_that_was_taken_is_not_given_again_when_its_machine_was_off_meanwhile(self) -> None:
+        """It has had it, by the confirmed write, and forgotten its number; its token may have gone on hours ago."""
+
+        async def test(b: Bench, place: str) -> None:
+            async with b.connected():
+                b.driver.send(b.place(place), 1)
+                await until(lambda: b.heard.takings == [(f"M.{place}", 1)], "the confirmed write is told as taken")
+                await b.ordered(1)
+                await b.far.end.cut()
+                await until(lambda: not b.driver.devices["D"].is_ready.is_set(), "the loss")
+                b.machine.switch_off_and_on()
+                await b.far.end.mend()
+                await until(b.driver.devices["D"].is_ready.is_set, "the return")
+                b.driver.send(b.place("grip"), 1)
+                await until(lambda: len(b.heard.takings) == 2, "the next command is taken")
+                await until(lambda: len(b.machine.orders) >= 2, "the next command arrives")
+            assert len(b.machine.orders) == 2
+            assert b.heard.takings == [(f"M.{place}", 1), ("M.grip", 1)]
+            assert b.heard.faults == []
+
+        for place in ("halt", "move"):
+            self.bench(partial(test, place=place), timeout_s=QUICK_S, shows_taken=False)
 
     def test_a_silent_device_is_lost_and_its_late_answers_are_no_answers(self) -> None:
         """A connection that has timed out may still bring its answer: nobody must be listening."""

@@ -84,6 +84,10 @@ class Machine:
         """Show a value at the point of a role."""
         self.end.show(self.points[role], value)
 
+    def switch_off_and_on(self) -> None:
+        """Forget what it had."""
+        self._ordered(0, 0)
+
     def finish(self, number: int | None = None) -> None:
         """Show that the newest command, or the one of a number, is done."""
         self.finished = self.number if number is None else number

@@ -236,6 +236,47 @@ def test_device_that_has_forgotten_a_command_is_not_given_it_again() -> None:
     assert one.next_writes() is None
 
 
+@pytest.mark.parametrize("answered", ["", "a"])
+def test_command_that_was_told_as_taken_by_its_confirmed_write_is_not_given_again(answered: str) -> None:
+    one = channel("a", "b", answered=answered, taken=False)
+    one.send("a", 1, "START", (("x", 5),))
+    after(one, done=0)
+    assert [told.said for told in one.written()] == [Said.TAKEN]
+    one.shows("done", 0)  # it may have been switched off and on
+    assert one.connected_again() is None
+    assert one.next_writes() is None
+    one.send("b", 1, "STOP", ())
+    assert one.next_writes() == (("n", one.number("b", 1)),)
+
+
+@pytest.mark.parametrize("taken", [False, True])
+def test_command_that_was_told_as_taken_before_its_write_was_confirmed_stands_in_no_way_when_it_is_forgotten(
+    taken: bool,
+) -> None:
+    one = channel("a", "b", taken=taken, failed=True)
+    one.send("a", 1, "START", ())
+    after(one, failed=0, done=0, **({"taken": 0} if taken else {}))
+    shown = "taken" if taken else "failed"
+    assert Said.TAKEN in [told.said for told in one.shows(shown, one.number("a", 1))]
+    one.shows(shown, 0)  # it has been switched off and on, and its confirmation is lost
+    one.connected_again()
+    assert one.next_writes() is None
+    assert not one.is_writing
+    one.send("b", 1, "STOP", ())
+    assert one.next_writes() == (("n", one.number("b", 1)),)
+
+
+def test_command_that_an_old_connection_has_brought_late_is_neither_cleared_nor_given_again() -> None:
+    one = channel("a")
+    number = one.number("a", 1)
+    one.send("a", 1, "START", ())
+    after(one, taken=0, done=0)
+    one.connected_again()
+    assert [told.said for told in one.shows("taken", number)] == [Said.TAKEN]
+    assert one.next_writes() is None
+    assert not one.is_writing
+
+
 def test_command_that_a_device_forgets_on_the_same_connection_is_told_once_and_one_that_it_has_done_is_not() -> None:
     one = channel("a", "b", answered="ab")
     first, second = one.number("a", 1), one.number("b", 1)
