@@ -55,6 +55,7 @@ devices:
     start_s: {start_s}
     heartbeat: {{write: {beat}, every_s: 0.05, tripped: {tripped}}}
     safe: {{{output}: false}}
+    {life}
     channels:
       M: {{{out}, {shown}done: {done}, failed: {failed}}}
 {emergency}
@@ -84,6 +85,8 @@ class Far:
     end: FarEnd
     keys: str
     points: Mapping[str, Point]
+    through_broker: bool = False
+    """Whether they lead to a broker: an emergency stop needs a sign of life there."""
 
 
 @dataclass
@@ -155,6 +158,8 @@ class Bench:
     """Whether the driver follows an emergency stop."""
     shows_taken: bool = True
     """Whether the channel of the machine shows what it has taken."""
+    within_s: float = 0.0
+    """Within what time the sign of life of the machine must change; where 0 it has none, unless it must have one."""
     driver: BoundDriver = field(init=False)
     heard: Heard = field(init=False)
 
@@ -164,12 +169,16 @@ class Bench:
     def begin(self) -> None:
         """Make a new driver, as after a restart."""
         self.heard = Heard()
+        within_s = self.within_s or (PATIENCE_S if self.button and self.far.through_broker else 0.0)
+        if within_s and not self.machine.signs:
+            self.machine.lives = True
         points = dict(self.far.points)
         codes = {name: f"{points['code']}: {i}" for i, name in enumerate(("move", "grip", "halt"), 1)}
         out = f"number: {points['number']}" if "number" in points else f"command: {points['command']}"
         text = _BINDING.format(
             keys="\n    ".join(self.far.keys.split(", ")),
             out=out,
+            life=f"alive: {{read: {points['alive']}, within_s: {within_s}}}" if within_s else "",
             shown=f"taken: {points['taken']}, " if self.shows_taken else "",
             needed=self.needed,
             start_s=self.start_s,

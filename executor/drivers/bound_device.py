@@ -106,7 +106,9 @@ class BoundDevice:
 
     async def run(self) -> None:
         """Keep the device connected."""
-        self._alarm(self.document.start_s, "not reached since the start")
+        alive = self.document.alive
+        seen = "reached" if alive is None else f"seen to be alive, by '{alive.read}',"
+        self._alarm(self.document.start_s, f"not {seen} since the start")
         loop = asyncio.get_running_loop()
         begun = loop.call_later(self.document.start_s, self._must_move) if self.contacts.contacts else None
         try:
@@ -164,9 +166,13 @@ class BoundDevice:
     @property
     def unreached(self) -> str:
         """That there is no connection to it now, and why, as far as that is known; empty where there is one."""
-        if self.is_ready.is_set():
-            return ""
-        return ": ".join(filter(None, (f"{self.name} is not connected", self.noted)))
+        return "" if self.is_ready.is_set() else ": ".join(filter(None, (self._away, self.noted)))
+
+    @property
+    def _away(self) -> str:
+        """What is to be said of it as long as it is not ready."""
+        is_silent = self.kept.is_connected and self.document.alive is not None
+        return f"{self.name} {'has not been seen to be alive' if is_silent else 'is not connected'}"
 
     @property
     def unshown(self) -> str:
@@ -187,7 +193,7 @@ class BoundDevice:
     def against(self) -> Iterator[str]:
         """What keeps its driver latched, in a phrase each."""
         if not self.is_ready.is_set():
-            yield f"{self.name} is not connected"
+            yield self._away
             return
         for name in sorted(self.contacts.open_ones):
             yield f"{self.name}: '{name}' is not closed"
@@ -200,9 +206,7 @@ class BoundDevice:
 
     def read(self, batch: Sequence[tuple[Point, Value]]) -> None:
         """Values have come."""
-        opened = self.contacts.opened(batch) if self.contacts.contacts else ""
-        if opened:  # before anything else
-            self._emergency(opened)
+        opened = self._opened(batch)  # before anything else
         now = self.driver.clock.now_seconds() if self.driver.clock is not None else 0.0
         changes, faults = self.image.take(batch, now)
         if not opened and not self.contacts.are_closed:
@@ -220,6 +224,17 @@ class BoundDevice:
             self._told_if_forgotten(channel.forgotten())
         if self.driver.listener is not None:
             self.driver.listener.all_told()
+
+    def unproven(self, batch: Sequence[tuple[Point, Value]]) -> None:
+        """Values have come from where the device has not been seen to be alive: an open contact stops all the same."""
+        self._opened(batch)
+
+    def _opened(self, batch: Sequence[tuple[Point, Value]]) -> str:
+        """Stop where a contact of the emergency stop is open; what opens it, in a sentence."""
+        opened = self.contacts.opened(batch) if self.contacts.contacts else ""
+        if opened:
+            self._emergency(opened)
+        return opened
 
     def ready(self) -> None:
         """A new connection has told what the device shows."""

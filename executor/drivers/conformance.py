@@ -316,6 +316,31 @@ class DriverConformance(StoppingConformance):
 
         self.bench(test, timeout_s=QUICK_S)
 
+    def test_a_device_that_gives_no_sign_of_life_stays_lost_over_every_connection(self) -> None:
+        """Who stands for it may answer, and show what was so before it died."""
+
+        async def test(b: Bench) -> None:
+            device = b.driver.devices["D"]
+            async with b.connected():
+                b.machine.show("sensor", value=True)
+                await until(lambda: b.heard_of("zero")[-1:] == [(True, None)], "the change")
+                b.machine.lives = False
+                await until(lambda: not device.is_ready.is_set(), "the loss")
+                assert b.quality("zero") == (False, Quality.BAD)
+                told = len(b.heard.signals)
+                b.driver.send(b.place("move"), 1)
+                connections = device.kept.connections
+                await until(lambda: device.kept.connections >= connections + 2, "two more connections")
+                assert not device.is_ready.is_set()
+                assert b.quality("zero") == (False, Quality.BAD)
+                assert b.heard.signals[told:] == []
+                assert b.machine.orders == []
+                b.machine.lives = True
+                await until(lambda: b.quality("zero") == (True, Quality.GOOD), "the return")
+                await b.ordered(1)
+
+        self.bench(test, within_s=QUICK_S)
+
     def test_a_slow_device_is_waited_for_within_its_time(self) -> None:
         """Slow is not lost."""
 

@@ -95,6 +95,27 @@ class StoppingConformance:
 
         self.bench(test, timeout_s=QUICK_S)
 
+    def test_a_device_that_gives_no_sign_of_life_at_the_start_is_driven_safe_and_commanded_when_it_does(self) -> None:
+        """It may be alive, so that the safe outputs do not wait; it may not have been, so that they come once more."""
+
+        async def test(b: Bench) -> None:
+            b.machine.lives = False
+            b.driver.send(b.place("move"), 1)
+            kept = b.driver.devices["D"].kept
+            async with b.running():
+                await until(lambda: kept.connections == 2, "another connection")
+                assert b.machine.outputs
+                assert "D" in b.driver.undriven
+                assert b.heard.signals == []
+                assert b.machine.orders == []
+                driven = len(b.machine.outputs)
+                b.machine.lives = True
+                await b.ordered(1)
+                assert len(b.machine.outputs) > driven
+                assert not b.driver.undriven
+
+        self.bench(test, within_s=QUICK_S)
+
     def test_safe_outputs_are_the_last_thing_at_the_end_and_nothing_is_sent_after_a_stop(self) -> None:
         """A stop is the end of what is sent."""
 
@@ -196,12 +217,13 @@ class StoppingConformance:
             async with b.connected():
                 b.driver.send(b.place("move"), 1)
                 await until(lambda: b.machine.orders, "the command arrives")
+                driven = len(b.machine.outputs)
                 b.machine.show("button", value=False)
                 await until(lambda: b.heard.emergencies, "the emergency stop")
                 assert b.driver.is_stopped
                 b.machine.show("button", value=True)
                 b.driver.send(b.place("halt"), 1)
-                await until(lambda: len(b.machine.outputs) == 2, "the safe outputs")
+                await until(lambda: len(b.machine.outputs) > driven, "the safe outputs")
             assert b.heard.emergencies == ["D: 'button' is open"]
             assert b.machine.events[-1] == "output"
             assert len(b.machine.orders) == 1
@@ -374,14 +396,15 @@ class StoppingConformance:
 
         async def test(b: Bench) -> None:
             async with b.connected():
-                await until(lambda: b.machine.outputs == [False], "the safe outputs")
+                await until(lambda: b.machine.outputs, "the safe outputs")
                 b.driver.send(b.place("move"), 1)
                 b.machine.show("button", value=False)
                 await until(lambda: tuple(b.driver.against()) == ("D: 'button' is not closed",), "the contact")
                 await b.far.end.cut()
                 await until(lambda: tuple(b.driver.against()) == ("D is not connected",), "the loss")
+                driven = len(b.machine.outputs)
                 await b.far.end.mend()
-                await until(lambda: b.machine.outputs == [False, False], "the safe outputs of another connection")
+                await until(lambda: len(b.machine.outputs) > driven, "the safe outputs of another connection")
                 b.machine.show("button", value=True)
                 await until(lambda: not b.driver.against(), "nothing is against it")
                 assert b.machine.orders == []
@@ -393,3 +416,23 @@ class StoppingConformance:
             assert b.heard.emergencies == ["D: 'button' is open"]
 
         self.bench(test, button=True, latched=True, needed="fault", timeout_s=QUICK_S)
+
+    def test_a_latched_driver_is_not_to_be_released_while_a_device_gives_no_sign_of_life(self) -> None:
+        """What it shows may be what it showed before it died, also that its button is not pressed."""
+
+        async def test(b: Bench) -> None:
+            b.machine.lives = False
+            kept, against = b.driver.devices["D"].kept, set[str]()
+
+            def looked() -> bool:
+                against.add("; ".join(b.driver.against()))
+                return kept.connections == 3
+
+            async with b.running():
+                await until(looked, "two more connections")
+                assert against == {"D is not connected", "D has not been seen to be alive"}
+                assert len(b.machine.outputs) >= 2
+                b.machine.lives = True
+                await until(lambda: not b.driver.against(), "nothing is against it")
+
+        self.bench(test, button=True, latched=True, within_s=QUICK_S)

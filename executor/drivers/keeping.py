@@ -17,6 +17,13 @@ whose answer is the reason of the stop, or be sent in steps. A connection that c
 are written once more when the time of its answer is over: what an earlier connection still brings must not be the last
 thing that a device gets.
 
+A connection alone says nothing of a device that has a sign of life (`alive`): a broker, or the server of a control
+whose program stands still, shows what was so once. What is read is held back until that sign has changed on this very
+connection, and nothing is commanded; the last value of an earlier one proves nothing, as it may have changed before the
+device died. Two things do not wait: heartbeats, from which many a device makes its sign of life, and the safe outputs
+with which a run begins, or a connection that is latched. These are written at once, for the device may be alive, and
+once more when it is seen to be, for it may not have been.
+
 An error that is no failure of a link is a mistake, in a library or in what is served here. It ends the run, and this
 device is stopped as any other: over a new connection of which nothing is taken, since what it shows may be what nobody
 can deal with.
@@ -71,8 +78,12 @@ class Served(Protocol):
         """Values have come."""
         ...
 
+    def unproven(self, batch: Sequence[tuple[Point, Value]]) -> None:
+        """Values have come from where the device has not been seen to be alive; they are read when it is."""
+        ...
+
     def ready(self) -> None:
-        """A new connection has told what the device shows, and may be written to."""
+        """A new connection has told what the device shows, which is alive, and may be written to."""
         ...
 
     def lost(self, why: str) -> None:
@@ -108,6 +119,9 @@ class Nobody:
     is_writing = is_latched = False
 
     def read(self, batch: Sequence[tuple[Point, Value]]) -> None:
+        """Take nothing."""
+
+    def unproven(self, batch: Sequence[tuple[Point, Value]]) -> None:
         """Take nothing."""
 
     def ready(self) -> None:
@@ -157,7 +171,7 @@ class Kept:
         """How many connections there have been."""
         self.is_connected = False
         self.started = False
-        """Whether the safe outputs of the start-up have been written."""
+        """Whether the safe outputs of the start-up have been written, to a device that is alive."""
         self.is_safe = not self.safe
         """Whether the device has confirmed the safe outputs of the stop, where it has any."""
         self.stopping = False
@@ -174,8 +188,13 @@ class Kept:
         self.stopped = asyncio.Event()
         """The safe outputs have been written for the last time, or cannot be."""
         self.beat = 0
+        self.is_alive = False
+        """Whether the device has changed its sign of life on this connection, where it has one."""
         self.alive_seconds = 0.0
         self.alive_value: Value | None = None
+        """What the sign of life is, as far as this connection has shown it."""
+        self.held: dict[Point, Value] = {}
+        """What this connection has shown before the device was seen to be alive."""
 
     async def run(self) -> None:
         """Keep the device connected; ends when it is stopped, and safe as far as it can be reached in time.
@@ -277,6 +296,9 @@ class Kept:
 
     async def _serve(self, connection: Connection) -> None:
         self.has_read = False
+        self.is_alive = self.document.alive is None
+        self.alive_value = None
+        self.held = {}
         await self._first_of(self._write(connection), self._read(connection))
 
     async def _until_read(self) -> None:
@@ -296,12 +318,21 @@ class Kept:
             await ended(tasks)
 
     def _take(self, batch: Sequence[tuple[Point, Value]]) -> None:
+        was_alive = self.is_alive
         if self.document.alive is not None:
             for point, value in batch:
                 if point == self.document.alive.read and value != self.alive_value:
+                    self.is_alive |= self.alive_value is not None
                     self.alive_value = value
                     self.alive_seconds = asyncio.get_running_loop().time()
-        self.served.read(batch)
+        if was_alive:
+            self.served.read(batch)
+            return
+        self.held.update(batch)
+        self.served.unproven(batch)
+        if self.is_alive:
+            self.served.read(tuple(self.held.items()))
+            self.awake.set()
 
     async def _read(self, connection: Connection) -> None:
         while True:
@@ -315,22 +346,19 @@ class Kept:
     async def _write(self, connection: Connection) -> None:
         if not (self.safe and self.served.is_latched):
             await self._until_read()
-        if (not self.started or self.served.is_latched) and not self.stopping:
-            if self.safe:
-                await connection.write(self.safe)
-            self.started = True
+        await self._make_safe(connection)
         await self._until_read()
         self.connections += 1
-        if not self.stopping:
-            self.served.ready()
         loop = asyncio.get_running_loop()
-        self.prompt = connection if isinstance(connection, Prompt) else None
-        self.withholding = connection if isinstance(connection, Withholding) else None
         heartbeat = self.document.heartbeat
         due = loop.time()
-        beaten = False
+        is_ready = beaten = False
         while not self.stopping or self.begun is not None:
             self.awake.clear()
+            if self.is_alive and not is_ready:
+                is_ready = True
+                await self._get_ready(connection)
+                continue  # it may have been stopped meanwhile
             if self.begun is not None:
                 beaten, (begun, self.begun) = False, (self.begun, None)
                 if await self._put(begun):
@@ -338,7 +366,7 @@ class Kept:
                 continue
             is_due = heartbeat is not None and loop.time() >= due
             # They take turns where a device is so slow that there is always a heartbeat to be sent.
-            if not (is_due and not beaten) and (some := self.served.next_writes()) is not None:
+            if is_ready and not (is_due and not beaten) and (some := self.served.next_writes()) is not None:
                 beaten = False
                 if await self._put(connection.write(some)):
                     self.served.written()
@@ -361,6 +389,23 @@ class Kept:
         if self.safe and (late_s := self.late_seconds - loop.time()) > 0:
             await asyncio.sleep(late_s)
             await connection.write(self.safe)
+
+    async def _make_safe(self, connection: Connection) -> None:
+        """Write the safe outputs with which the run begins, or each connection of one that is latched."""
+        if (not self.started or self.served.is_latched) and not self.stopping:
+            was_alive = self.is_alive
+            if self.safe:
+                await connection.write(self.safe)
+            self.started |= was_alive
+
+    async def _get_ready(self, connection: Connection) -> None:
+        """Let the device be commanded, which has shown what it shows, and that it is alive."""
+        if self.document.alive is not None:
+            await self._make_safe(connection)
+        if not self.stopping:
+            self.served.ready()
+        self.prompt = connection if isinstance(connection, Prompt) else None
+        self.withholding = connection if isinstance(connection, Withholding) else None
 
     async def _put(self, writing: Coroutine[Any, Any, None]) -> bool:
         """Write, and break it off at a stop, so that no machine starts after it; the connection is of no use then.
@@ -411,6 +456,6 @@ class Kept:
             await loop.create_future()
             return
         self.alive_seconds = loop.time()
-        while (silent_s := loop.time() - self.alive_seconds) < alive.within_s:
-            await asyncio.sleep(alive.within_s - silent_s)
+        while (left_s := self.alive_seconds + alive.within_s - loop.time()) > 0:
+            await asyncio.sleep(left_s)
         raise LinkError(f"silent: '{alive.read}' has not changed within {alive.within_s:g} s")

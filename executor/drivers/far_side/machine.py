@@ -2,7 +2,7 @@
 
 It keeps the rules of a channel: a number that it has is ignored, another one is taken; number 0 clears what it shows.
 Its watchdog, when it has been given one, sets the output to its safe value and fails the command under way; that it
-has done so is shown until the output is written anew.
+has done so is shown until the output is written anew. Where it is asked for a sign of life it gives one while it lives.
 """
 
 from __future__ import annotations
@@ -15,8 +15,11 @@ from typing import Final
 from firable.executor.drivers.device import Point, Value, as_number
 from firable.executor.drivers.far_side.end import FarEnd
 
-ROLES: Final = ("sensor", "closed", "button", "beat", "tripped", "output", "code", "taken", "done", "failed")
+ROLES: Final = ("sensor", "closed", "button", "beat", "tripped", "output", "code", "taken", "done", "failed", "alive")
 """What an end must have a point for; besides `number` or `command`."""
+
+SIGN_S: Final = 0.01
+"""How long its sign of life stays as it is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +54,9 @@ class Machine:
         self.finishes_at_once = False
         self.watchdog_s = 0.0
         self.watching: asyncio.TimerHandle | None = None
+        self.signs = 0
+        """How often its sign of life has changed."""
+        self.living: asyncio.TimerHandle | None = None
 
     async def start(self) -> None:
         """Begin to serve, with everything at 0."""
@@ -63,9 +69,23 @@ class Machine:
 
     async def stop(self) -> None:
         """End."""
+        self.lives = False
         if self.watching is not None:
             self.watching.cancel()
         await self.end.stop()
+
+    @property
+    def lives(self) -> bool:
+        """Whether it gives a sign of life, a number that grows."""
+        return self.living is not None
+
+    @lives.setter
+    def lives(self, value: bool) -> None:
+        if self.living is not None:
+            self.living.cancel()
+        self.living = None
+        if value:
+            self._live()
 
     @property
     def takes(self) -> bool:
@@ -132,6 +152,11 @@ class Machine:
             self.show("taken", number)
             if self.finishes_at_once:
                 self.finish()
+
+    def _live(self) -> None:
+        self.signs += 1
+        self.show("alive", self.signs)
+        self.living = asyncio.get_running_loop().call_later(SIGN_S, self._live)
 
     def _beaten(self) -> None:
         self.beats += 1

@@ -29,8 +29,8 @@ MODBUS = {
     "taken": "input 10",
     "done": "input 11",
     "failed": "input 12",
+    "alive": "input 13",
 }
-ALIVE = "alive: {read: cell/M/button,within_s: 600}"
 NO_BROKER = pytest.mark.skipif(mosquitto() is None, reason="needs the broker mosquitto, which is not installed")
 
 
@@ -72,7 +72,7 @@ async def way(kind: str) -> AsyncIterator[Way]:
         case _:
             points = {role: f"cell/M/{role}" for role in (*ROLES, "command")}
             end = MqttEnd({points[role] for role in ("output", "beat", "code", "command")})
-            keys = f"driver: mqtt, host: 127.0.0.1, {ALIVE}"
+            keys = "driver: mqtt, host: 127.0.0.1"
     machine = Machine(end, points)
     await machine.start()
     try:

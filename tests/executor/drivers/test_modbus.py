@@ -32,6 +32,7 @@ POINTS = {
     "taken": "input 10",
     "done": "input 11",
     "failed": "input 12",
+    "alive": "input 13",
 }
 
 

@@ -22,10 +22,6 @@ from firable.executor.drivers.far_side.mqtt_device import MqttEnd, mosquitto
 from firable.executor.drivers.far_side.ports import free_port
 from firable.executor.drivers.mqtt import KIND, Guarded, MqttOptions
 
-ALIVE = "alive: {read: cell/M/button,within_s: 600}"
-"""What a broker's device needs for an emergency stop; here it does not change."""
-
-
 needs_mosquitto = pytest.mark.skipif(mosquitto() is None, reason="needs the broker mosquitto, which is not installed")
 
 
@@ -35,7 +31,7 @@ class TestMqtt(DriverConformance):
     async def far_end(self) -> AsyncIterator[Far]:
         points = {role: f"cell/M/{role}" for role in (*ROLES, "command")}
         end = MqttEnd({points[role] for role in ("output", "beat", "code", "command")})
-        yield Far(end, f"driver: mqtt, host: 127.0.0.1, port: {end.port}, {ALIVE}", points)
+        yield Far(end, f"driver: mqtt, host: 127.0.0.1, port: {end.port}", points, through_broker=True)
 
 
 @needs_mosquitto
