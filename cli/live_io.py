@@ -62,12 +62,14 @@ def live_io(
     --once waits for all devices at the same time, for each as long as its `start_s` says, and names those that do not
     answer.
 
-    Ctrl-C ends it. Exit codes: 0, or 1 where a machine was stopped or has failed at what was sent, 2 for a binding that
-    cannot be used, and 3 where --once cannot read something.
+    Ctrl-C ends it, as does a request to terminate or the end of its terminal. Exit codes: 0, or 1 where a machine was
+    stopped or has failed at what was sent, 2 for a binding that cannot be used, and 3 where --once cannot read
+    something.
     """
     import asyncio
 
     from firable.executor.drivers.binding import read_binding
+    from firable.executor.operating.uncut import ended_by_signals
     from firable.nets.diagnostics import InputError
 
     if once and seconds is not None:
@@ -79,10 +81,15 @@ def live_io(
     if both := [signal for signal, value in forced if (signal, not value) in forced]:
         raise click.UsageError(f"'{both[0]}' is forced to 0 and to 1: name it once")
     places = _sent(binding, send, of)
+    heard = _Heard() if format_ == "text" else _HeardByPrograms(bind)
+
+    async def ended() -> int:
+        with ended_by_signals():
+            return await _shown(binding, forced, places, heard, once=once, seconds=seconds)
+
     try:
-        heard = _Heard() if format_ == "text" else _HeardByPrograms(bind)
-        return asyncio.run(_shown(binding, forced, places, heard, once=once, seconds=seconds))
-    except KeyboardInterrupt:
+        return asyncio.run(ended())
+    except (KeyboardInterrupt, asyncio.CancelledError):
         return 0
 
 

@@ -7,10 +7,11 @@ import io
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 
 import pytest
+from support.asking import heard
 from support.hosts import ended_within
 
 from firable.decompose.splitting.cut import split
@@ -260,16 +261,6 @@ def test_whoever_cancels_again_does_not_cut_off_the_safe_outputs() -> None:
 
 
 ASKING = [signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT]
-
-
-@contextmanager
-def heard(number: signal.Signals) -> Iterator[None]:
-    """Whoever runs the tests in the background has SIGINT ignored, and by `nohup` SIGHUP: here they are not."""
-    earlier = signal.signal(number, signal.SIG_DFL)
-    try:
-        yield
-    finally:
-        signal.signal(number, earlier)
 
 
 @pytest.mark.parametrize("number", ASKING)
