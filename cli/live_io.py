@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from firable.nets.net import Place
 
 _REFRESH_SECONDS = 0.25
+_ENDED = "the emergency stop has ended the sending"
 _COLOURS = {"good": "green", "uncertain": "yellow", "bad": "red"}
 
 
@@ -57,7 +58,7 @@ def live_io(
 
     --force and --send write, each only where the binding says `force: true` of the signal or of the command. With
     --send this is the master of the devices: it gives them their heartbeats, and drives the safe outputs at both ends.
-    Never do that beside a running cell.
+    An emergency stop is one of them, and ends this. Never do that beside a running cell.
 
     --once waits for all devices at the same time, for each as long as its `start_s` says, and names those that do not
     answer.
@@ -179,6 +180,10 @@ class _Heard:
         self.failed = True
         self._told(f"{click.style('emergency stop', fg='red')}: {reason}")
 
+    def sending_ended(self) -> None:
+        """The driver has driven its safe outputs, and has ended."""
+        self._told(f"{_ENDED}, and nothing is read any more")
+
     def _told(self, line: str) -> None:
         self.lines = 0
         click.echo(line, err=True)
@@ -261,24 +266,49 @@ async def _shown(
         while not heard.failed and any(d.is_writing for d in driver.devices.values() if d.is_ready.is_set()):
             await asyncio.sleep(0.01)
         if once:
-            await asyncio.sleep(_REFRESH_SECONDS)  # what is told a moment after the first answer
+            await asyncio.wait([running], timeout=_REFRESH_SECONDS)  # what is told a moment after the first answer
+        else:
+            await _watched(driver, running, heard, seconds)
+        is_ended = await _ended_by_a_stop(driver, running)
+        if is_ended:
+            heard.sending_ended()
+        if once or is_ended:
             heard.show(driver)
-            good = all(reading.quality is Quality.GOOD for reading in driver.readings().values())
-            return 3 if not (good and reached) else 1 if places and heard.failed else 0
-        before: dict[str, Reading] = {}
-        while seconds is None or heard.now_seconds() < seconds:
-            now = dict(driver.readings())
-            changed = [name for name, one in now.items() if name not in before or _differ(one, before[name])]
-            if sys.stdout.isatty() or changed:
-                heard.show(driver)
-            before = now
-            await asyncio.wait([running], timeout=_REFRESH_SECONDS)
-            if running.done():
-                running.result()
+        good = all(reading.quality is Quality.GOOD for reading in driver.readings().values())
+        if once and not is_ended and not (good and reached):
+            return 3
         return 1 if places and heard.failed else 0
     finally:
         running.cancel()
         await asyncio.gather(running, return_exceptions=True)
+
+
+async def _watched(driver: BoundDriver, running: asyncio.Task[None], heard: _Heard, seconds: float | None) -> None:
+    """Show the signals, on a terminal all the time and else whenever one has changed, until the end or a stop."""
+    import asyncio
+
+    before: dict[str, Reading] = {}
+    while not running.done() and (seconds is None or heard.now_seconds() < seconds):
+        now = dict(driver.readings())
+        changed = [name for name, one in now.items() if name not in before or _differ(one, before[name])]
+        if sys.stdout.isatty() or changed:
+            heard.show(driver)
+        before = now
+        await asyncio.wait([running], timeout=_REFRESH_SECONDS)
+
+
+async def _ended_by_a_stop(driver: BoundDriver, running: asyncio.Task[None]) -> bool:
+    """Whether an emergency stop has ended the driver, or is about to: then nothing that was shown holds any more."""
+    import asyncio
+
+    if driver.is_stopped:
+        await asyncio.wait([running])
+    if not running.done():
+        return False
+    running.result()
+    for device in driver.devices.values():
+        device.left(_ENDED)
+    return True
 
 
 def _differ(one: Reading, other: Reading) -> bool:

@@ -277,6 +277,11 @@ class BoundDevice:
             self.noted = why
             self.note(f"not connected: {why}")
 
+    def left(self, why: str) -> None:
+        """Its driver has ended: nothing is read any more, and what it has shown is past, whatever the grace."""
+        self.is_ready.clear()
+        self.image.lost(why)
+
     def broken(self, error: Exception) -> None:
         """Its driver has made a mistake: all devices are stopped, and the run ends."""
         try:

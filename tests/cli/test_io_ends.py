@@ -1,6 +1,7 @@
-"""`firable io` on a serial line: how it ends, and what it leaves to others."""
+"""`firable io`: how it ends, with what verdict, and what it leaves to others."""
 
 import asyncio
+import json
 import signal
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 from support.asking import heard
 from support.waiting import PATIENCE_SECONDS
 
+from firable.cli.main import main as firable
 from firable.executor.drivers.bench import until
 from firable.executor.drivers.device import Point, Value
 from firable.executor.drivers.far_side.serial_device import SerialEnd
@@ -75,3 +77,40 @@ def test_machine_that_was_sent_something_is_stopped_however_io_is_asked_to_end(
 
     asyncio.run(main())
     assert written == [("out", "0"), ("move", "1 A MOVE"), ("out", "0")]
+
+
+PRESSED = """
+firable_bind: 1
+cell: arm
+devices:
+  bench:
+    driver: simulated
+    shows: {button: 1, key: 1}
+    effects: {A MOVE: {seconds: 0.1, then: {button: 0}}}
+    grace_s: 60
+    channels: {A: {command: A, taken: A.taken, done: A.done, failed: A.failed}}
+    safe: {stop: 1}
+emergency_stop: {button: {device: bench, read: button}}
+signals: {a.key: {device: bench, read: key, on_loss: hold}}
+commands: {a.away: {device: bench, channel: A, force: true}}
+"""
+
+
+@pytest.mark.parametrize("until_when", [("--for", "30"), ("--once",)], ids=lambda option: option[0])
+def test_what_was_read_before_an_emergency_stop_is_not_shown_as_what_is_now(
+    until_when: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    net, bind = tmp_path / "arm.firable.yaml", tmp_path / "arm.bind.yaml"
+    net.write_text(NET)
+    bind.write_text(PRESSED)
+    command = ["io", str(bind), "--net", str(net), "--send", "a.away", "--format", "json", *until_when]
+    assert firable(command) == 1
+    said = capsys.readouterr()
+    last = json.loads(said.out.splitlines()[-1])
+    assert last["devices"] == {"bench": {"connected": False}}
+    shown = {name: (one["value"], one["quality"], one["why"]) for name, one in last["signals"].items()}
+    why = "the emergency stop has ended the sending"
+    assert shown == {"a.key": (True, "uncertain", why), "emergency stop button": (False, "bad", why)}
+    assert last["at_seconds"] < 25
+    assert "emergency stop: bench: 'button' is open" in said.err
+    assert said.err.splitlines()[-1] == "the emergency stop has ended the sending, and nothing is read any more"
