@@ -21,7 +21,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from firable.executor.drivers.device import Bounded, DeviceKind, Options, Point, Use, Value, Writes, files_of
+from firable.executor.drivers.device import Bounded, DeviceKind, Divided, Options, Point, Use, Value, Writes, files_of
 from firable.executor.drivers.kinds import kind_named
 from firable.executor.drivers.overlapping import overlaps
 from firable.nets.diagnostics import Diagnostic, InputError, did_you_mean
@@ -361,6 +361,7 @@ class _Reading:
                     self.point(bound.device, ("signals", signal, "edges"), bound.edges, Use.READ)
                 if bound.force:
                     self.point(bound.device, ("signals", signal, "force"), bound.read, Use.WRITE)
+                    self.forced(signal, bound)
         for place, command in self.document.commands.items():
             if not self.device(("commands", place), command.device):
                 continue
@@ -381,6 +382,30 @@ class _Reading:
             message = f"whether '{contact.device}' is there is not to be seen through its broker"
             hint = "give the device `alive: {read: ADDRESS, within_s: SECONDS}`, so that its loss stops the machines"
             self.problem("F5101", ("emergency_stop", name, "device"), message, hint)
+
+    def forced(self, signal: str, bound: SignalDocument) -> None:
+        """Refuse a signal that may be forced at the point of a contact of the emergency stop: that would close it."""
+        for name, contact in self.document.emergency_stop.items():
+            if self.is_one(bound.device, contact.device) and self.is_written_with(bound, contact):
+                message = f"'{bound.read}' shows the contact '{name}', which is opened and closed by hand alone"
+                hint = "leave out `force: true`, or read the signal where no contact of the emergency stop is"
+                self.problem("F5102", ("signals", signal, "force"), message, hint)
+
+    def is_one(self, name: str, other: str) -> bool:
+        """Whether two devices are one, or stand at one address."""
+        if name == other or other not in self.document.devices:
+            return name == other
+        is_alike = self.document.devices[name].driver == self.document.devices[other].driver
+        return is_alike and self.options[name].far_end() == self.options[other].far_end()
+
+    def is_written_with(self, bound: SignalDocument, contact: EmergencyDocument) -> bool:
+        """Whether what is written to a signal changes what a contact of the same device shows."""
+        if bound.read == contact.read:
+            return True
+        kind = self.kinds[bound.device]
+        return isinstance(kind, Divided) and (
+            kind.whole(bound.read) == contact.read or bound.read == kind.whole(contact.read)
+        )
 
     def device(self, path: TreePath, name: str) -> bool:
         if name in self.document.devices:

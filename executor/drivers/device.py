@@ -226,6 +226,15 @@ class Bounded(Protocol):
         ...
 
 
+@runtime_checkable
+class Divided(Protocol):
+    """A kind of device (`DeviceKind`) of which one point may be a part of another, as a bit is of a register."""
+
+    def whole(self, point: Point) -> Point:
+        """The point that is written with this one, which is a part of it; itself where it is none."""
+        ...
+
+
 class DeviceKind(Protocol):
     """A kind of device: how its options and addresses are written, and how one connects to it."""
 

@@ -85,6 +85,10 @@ class _Modbus:
         is_whole = isinstance(value, int) and REGISTER_MIN <= value <= REGISTER_MAX
         return "" if is_whole else f"a register takes whole numbers from {REGISTER_MIN} to {REGISTER_MAX}"
 
+    def whole(self, point: Point) -> Point:
+        """The register of a bit."""
+        return point.partition(".")[0]
+
 
 class ModbusTcp(_Modbus):
     """Modbus in a network."""

@@ -321,6 +321,33 @@ def test_a_contact_of_the_emergency_stop_that_would_stop_nothing_is_refused(
     assert found in refusal(edited("signals:", stop), fit=found == ("F5101", "14: controllers"))
 
 
+@pytest.mark.parametrize(
+    ("device", "contact", "signal", "is_refused"),
+    [
+        ("plc", "coil 3", "coil 3", True),
+        ("plc", "coil 3", "coil 4", False),
+        ("plc", "holding 3.5", "holding 3", True),
+        ("plc", "holding 3", "holding 3.5", True),
+        ("plc", "holding 3.5", "holding 3.6", False),
+        ("same", "coil 3", "coil 3", True),
+        ("other", "coil 3", "coil 3", False),
+    ],
+)
+def test_signal_that_may_be_forced_where_a_contact_of_the_emergency_stop_is_read_is_refused(
+    device: str, contact: str, signal: str, *, is_refused: bool
+) -> None:
+    hosts = {"plc": "10.0.0.1", "same": "10.0.0.1", "other": "10.0.0.2"}
+    devices = "".join(f"  {name}: {{driver: modbus-tcp, host: {host}}}\n" for name, host in hosts.items())
+    text = (
+        f"firable_bind: 1\ncell: c\ndevices:\n{devices}"
+        f"emergency_stop: {{door: {{device: plc, read: {contact}}}}}\n"
+        f"signals:\n  a.door: {{device: {device}, read: {signal}, FORCE}}\n"
+    )
+    assert parse_binding(text.replace(", FORCE", ""))
+    forced = text.replace("FORCE", "force: true")
+    assert refusal(forced) == [("F5102", "9: force")] if is_refused else parse_binding(forced)
+
+
 def test_a_host_with_all_controllers_drives_what_is_behind_a_contact_and_one_of_several_does_not_have_it() -> None:
     (part,) = split(NET).subnets
     far = "  far:\n    driver: modbus-tcp\n    host: 10.0.0.2\n    safe: {coil 9: false}\nemergency_stop:"
