@@ -55,6 +55,7 @@ def live_io(
     """Show the signals of BIND as they are: value, quality, age, and how many edges were coalesced.
 
     Looking disturbs nothing: neither safe outputs nor heartbeats are written, so it may be done beside a running cell.
+    Only a serial line is one program's: this ends where another one has it, and nobody has it while this looks at it.
 
     --force and --send write, each only where the binding says `force: true` of the signal or of the command. With
     --send this is the master of the devices: it gives them their heartbeats, and drives the safe outputs at both ends.
@@ -64,8 +65,8 @@ def live_io(
     answer.
 
     Ctrl-C ends it, as does a request to terminate or the end of its terminal. Exit codes: 0, or 1 where a machine was
-    stopped or has failed at what was sent, 2 for a binding that cannot be used, and 3 where --once cannot read
-    something.
+    stopped or has failed at what was sent, 2 for a binding that cannot be used or a serial line that another program
+    has, and 3 where --once cannot read something.
     """
     import asyncio
 
@@ -145,11 +146,17 @@ class _Heard:
     """Who listens: faults and notes are told as they come."""
 
     def __init__(self) -> None:
+        import asyncio
+
         self.begun = time.monotonic()
         self.failed = False
         """Whether a machine has failed, or was stopped."""
         self.lines = 0
         """How many lines of the table stand above, to be written over."""
+        self.lines_taken: dict[str, str] = {}
+        """The devices whose serial line another program has, and how that was told."""
+        self.is_to_end = asyncio.Event()
+        """Whether there is one."""
 
     def now_seconds(self) -> float:
         return time.monotonic() - self.begun
@@ -174,7 +181,13 @@ class _Heard:
         self._told(f"{click.style('fault', fg='red')}: {machine}: {message}")
 
     def driver_note(self, machine: str, message: str) -> None:
-        self._told(f"{machine}: {message}")
+        if machine not in self.lines_taken:  # which is told at the end
+            self._told(f"{machine}: {message}")
+
+    def line_taken(self, machine: str, message: str) -> None:
+        """The line of a device is another program's."""
+        self.lines_taken[machine] = message
+        self.is_to_end.set()
 
     def emergency_stop(self, reason: str) -> None:
         self.failed = True
@@ -254,16 +267,19 @@ async def _shown(
 
     from firable.executor.drivers.bound import BoundDriver
     from firable.executor.drivers.driver import Quality
+    from firable.executor.drivers.sparing import sparing
 
-    driver = BoundDriver(binding if places else binding.watching(), (), frozenset())
-    running = asyncio.create_task(driver.run(heard, heard))
+    driver = BoundDriver(sparing(binding if places else binding.watching(), heard.line_taken), (), frozenset())
+    running = asyncio.create_task(_served(driver, heard))
     try:
         reached = await _connected(driver, running)
         for signal, value in forced:
             driver.force(signal, value)
         for place in places:
             driver.send(place, 0)
-        while not heard.failed and any(d.is_writing for d in driver.devices.values() if d.is_ready.is_set()):
+        while not (heard.failed or running.done()) and any(
+            device.is_writing for device in driver.devices.values() if device.is_ready.is_set()
+        ):
             await asyncio.sleep(0.01)
         if once:
             await asyncio.wait([running], timeout=_REFRESH_SECONDS)  # what is told a moment after the first answer
@@ -281,6 +297,25 @@ async def _shown(
     finally:
         running.cancel()
         await asyncio.gather(running, return_exceptions=True)
+
+
+async def _served(driver: BoundDriver, heard: _Heard) -> None:
+    """Serve the devices until a stop, or until a line is another program's: then nothing is touched any more."""
+    import asyncio
+
+    from firable.executor.drivers.cancelling import ended
+
+    serving = asyncio.create_task(driver.run(heard, heard))
+    is_to_end = asyncio.create_task(heard.is_to_end.wait())
+    try:
+        await asyncio.wait([serving, is_to_end], return_when=asyncio.FIRST_COMPLETED)
+        for machine in heard.lines_taken:
+            driver.devices[machine].left_to_another()
+    finally:
+        await ended([serving, is_to_end])
+    for machine, message in heard.lines_taken.items():
+        raise click.ClickException(f"'{machine}' is left to the program that has its line: {message}")
+    serving.result()
 
 
 async def _watched(driver: BoundDriver, running: asyncio.Task[None], heard: _Heard, seconds: float | None) -> None:

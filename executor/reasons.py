@@ -22,12 +22,21 @@ def reason(error: Exception) -> str:
     return str(error.strerror or error)
 
 
+def is_in_use(error: Exception) -> bool:
+    """Whether a serial port cannot be had because another program has it.
+
+    >>> is_in_use(BlockingIOError(errno.EAGAIN, "locked")), is_in_use(FileNotFoundError(errno.ENOENT, "none"))
+    (True, False)
+    """
+    return isinstance(error, OSError) and error.errno in {errno.EAGAIN, errno.EBUSY}
+
+
 def port_reason(error: Exception) -> str:
     """Why a serial port cannot be had; one that another program has is locked by it.
 
     What the system says of a file that is no port, pyserial hands on in words of its own.
     """
-    if isinstance(error, OSError) and error.errno in {errno.EAGAIN, errno.EBUSY}:
+    if is_in_use(error):
         return "another program has it open"
     said_first = error.__context__
     if said_first is not None and said_first.args[:1] == (errno.ENOTTY,):

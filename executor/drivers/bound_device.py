@@ -282,6 +282,10 @@ class BoundDevice:
         self.is_ready.clear()
         self.image.lost(why)
 
+    def left_to_another(self) -> None:
+        """Another program has its line, and its safe outputs are for that one to write: a stop does not try to."""
+        self.kept.is_safe = True
+
     def broken(self, error: Exception) -> None:
         """Its driver has made a mistake: all devices are stopped, and the run ends."""
         try:

@@ -50,6 +50,10 @@ class LinkError(Exception):
     """A connection cannot be made, has failed, has timed out, or brought what nobody can read."""
 
 
+class InUseError(LinkError):
+    """A connection cannot be made because another program has what can be had by one alone: a serial line."""
+
+
 class WithheldError(LinkError):
     """What was to be written was withheld (`Withholding`); the connection is as good as before."""
 

@@ -14,6 +14,7 @@ from pydantic import Field
 from firable.executor.drivers.addresses import HostName, LinePath, one_name
 from firable.executor.drivers.device import (
     Connection,
+    InUseError,
     LinkError,
     Options,
     Point,
@@ -26,7 +27,7 @@ from firable.executor.drivers.device import (
 )
 from firable.executor.drivers.modbus_connection import ModbusConnection
 from firable.executor.drivers.modbus_points import BITS, REGISTER_MAX, REGISTER_MIN, WRITTEN, address
-from firable.executor.reasons import port_reason
+from firable.executor.reasons import is_in_use, port_reason
 
 if TYPE_CHECKING:
     from functools import partial
@@ -171,15 +172,16 @@ def _close_where_refused(client: AsyncModbusSerialClient) -> None:
     client.ctx.call_create = create
 
 
-def _port_refused(port: str) -> str:
+def _port_refused(port: str) -> LinkError:
     """Why a port could not be opened: pymodbus tells nobody."""
     from serial import Serial
 
     try:
         Serial(port, exclusive=True).close()
     except OSError as error:
-        return f"{port}: {port_reason(error)}"
-    return f"{port} does not answer"
+        kind = InUseError if is_in_use(error) else LinkError
+        return kind(f"{port}: {port_reason(error)}")
+    return LinkError(f"{port} does not answer")
 
 
 async def _opened(
@@ -188,7 +190,7 @@ async def _opened(
     quiet("pymodbus")
     try:
         if not await client.connect():
-            raise LinkError(_port_refused(where) if is_line else f"{where} does not answer")
+            raise _port_refused(where) if is_line else LinkError(f"{where} does not answer")
         if is_to_itself(client.ctx.transport):
             raise LinkError(f"{where} does not answer: the connection leads to itself")
     except BaseException:

@@ -26,6 +26,7 @@ from pydantic import Field
 from firable.executor.drivers.addresses import LinePath
 from firable.executor.drivers.device import (
     Connection,
+    InUseError,
     LinkError,
     Options,
     Point,
@@ -35,7 +36,7 @@ from firable.executor.drivers.device import (
     Wanted,
     Writes,
 )
-from firable.executor.reasons import port_reason
+from firable.executor.reasons import is_in_use, port_reason
 
 if TYPE_CHECKING:
     from serial import Serial
@@ -242,7 +243,8 @@ class SerialLine:
         try:
             port = Serial(options.port, options.baud, timeout=0, write_timeout=0, exclusive=True)
         except (SerialException, ValueError) as error:
-            raise LinkError(f"{options.port}: {port_reason(error)}") from None
+            kind = InUseError if is_in_use(error) else LinkError
+            raise kind(f"{options.port}: {port_reason(error)}") from None
         port.reset_input_buffer()
         return SerialConnection(Lines(port), wanted, options.every_s)
 

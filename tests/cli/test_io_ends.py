@@ -2,18 +2,23 @@
 
 import asyncio
 import json
+import os
 import signal
 import sys
+import time
 from pathlib import Path
 
 import pytest
+from serial import Serial
 from support.asking import heard
 from support.waiting import PATIENCE_SECONDS
 
 from firable.cli.main import main as firable
+from firable.executor.drivers import serial_line
 from firable.executor.drivers.bench import until
-from firable.executor.drivers.device import Point, Value
+from firable.executor.drivers.device import InUseError, Point, Value, Wanted
 from firable.executor.drivers.far_side.serial_device import SerialEnd
+from firable.executor.drivers.sparing import Sparing
 
 NET = """
 firable: 1
@@ -114,3 +119,62 @@ def test_what_was_read_before_an_emergency_stop_is_not_shown_as_what_is_now(
     assert last["at_seconds"] < 25
     assert "emergency stop: bench: 'button' is open" in said.err
     assert said.err.splitlines()[-1] == "the emergency stop has ended the sending, and nothing is read any more"
+
+
+IN_USE = """
+firable_bind: 1
+cell: arm
+devices:
+  line: {driver: KIND, port: PORT, start_s: 30}
+signals: {a.key: {device: line, read: POINT, on_loss: hold}}
+"""
+
+
+@pytest.mark.parametrize(("kind", "point"), [("serial", "key"), ("modbus-rtu, parity: N", "coil 1")])
+@pytest.mark.parametrize("until_when", [("--once",), ("--for", "40")], ids=lambda option: option[0])
+def test_line_that_another_program_has_is_left_to_it_at_once(
+    kind: str, point: str, until_when: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    far, near = os.openpty()
+    port, bind = os.ttyname(near), tmp_path / "line.bind.yaml"
+    bind.write_text(IN_USE.replace("KIND", kind).replace("PORT", port).replace("POINT", point))
+    begun = time.monotonic()
+    with Serial(port, exclusive=True):
+        assert firable(["io", str(bind), *until_when]) == 2
+    assert time.monotonic() - begun < 25
+    said = f"Error: 'line' is left to the program that has its line: {port}: another program has it open"
+    assert capsys.readouterr().err.splitlines() == [said]
+    os.close(near)
+    os.close(far)
+
+
+def test_who_sends_by_hand_does_not_wait_for_a_line_of_another_program_to_stop_its_machines(tmp_path: Path) -> None:
+    far, near = os.openpty()
+    net, bind = tmp_path / "arm.firable.yaml", tmp_path / "arm.bind.yaml"
+    net.write_text(NET)
+    bind.write_text(BIND.replace("PORT", f"{os.ttyname(near)}, timeout_s: 30"))
+    begun = time.monotonic()
+    with Serial(os.ttyname(near), exclusive=True):
+        assert firable(["io", str(bind), "--net", str(net), "--send", "a.away"]) == 2
+    assert time.monotonic() - begun < 25
+    os.close(near)
+    os.close(far)
+
+
+def test_line_that_was_found_in_use_is_not_asked_for_again() -> None:
+    far, near = os.openpty()
+    port = os.ttyname(near)
+    told: list[str] = []
+    kind = Sparing(serial_line.KIND, told.append)
+
+    async def refusal() -> str:
+        with pytest.raises(InUseError) as refused:
+            await kind.connect(serial_line.SerialOptions(port=port), Wanted((), 5.0))
+        return str(refused.value)
+
+    with Serial(port, exclusive=True):
+        assert asyncio.run(refusal()) == f"{port}: another program has it open"
+    assert asyncio.run(refusal()) == f"{port}: another program has it open"  # and is free
+    assert told == [f"{port}: another program has it open"]
+    os.close(near)
+    os.close(far)
