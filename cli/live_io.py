@@ -6,6 +6,7 @@ import json
 import sys
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import click
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
     from firable.executor.drivers.binding import Binding
     from firable.executor.drivers.bound import BoundDriver
+    from firable.executor.drivers.bound_device import Forcing
     from firable.executor.drivers.driver import Reading
     from firable.nets.net import Place
 
@@ -57,16 +59,18 @@ def live_io(
     Looking disturbs nothing: neither safe outputs nor heartbeats are written, so it may be done beside a running cell.
     Only a serial line is one program's: this ends where another one has it, and nobody has it while this looks at it.
 
-    --force and --send write, each only where the binding says `force: true` of the signal or of the command. With
-    --send this is the master of the devices: it gives them their heartbeats, and drives the safe outputs at both ends.
-    An emergency stop is one of them, and ends this. Never do that beside a running cell.
+    --force and --send write, each only where the binding says `force: true` of the signal or of the command. What is
+    forced is written once, on the first connection; where the device does not take it, that is told at the end.
+
+    With --send this is the master of the devices: it gives them their heartbeats, and drives the safe outputs at both
+    ends. An emergency stop ends it. Never do that beside a running cell.
 
     --once waits for all devices at the same time, for each as long as its `start_s` says, and names those that do not
     answer.
 
     Ctrl-C ends it, as does a request to terminate or the end of its terminal. Exit codes: 0, or 1 where a machine was
-    stopped or has failed at what was sent, 2 for a binding that cannot be used or a serial line that another program
-    has, and 3 where --once cannot read something.
+    stopped or has failed at what was sent, or something was not forced; 2 for a binding that cannot be used or a serial
+    line that another program has; and 3 where --once cannot read something.
     """
     import asyncio
 
@@ -89,10 +93,10 @@ def live_io(
         with ended_by_signals():
             return await _shown(binding, forced, places, heard, once=once, seconds=seconds)
 
-    try:
-        return asyncio.run(ended())
-    except (KeyboardInterrupt, asyncio.CancelledError):
-        return 0
+    code = 0
+    with suppress(KeyboardInterrupt, asyncio.CancelledError):
+        code = asyncio.run(ended())
+    return 1 if heard.tell_unforced() and not code else code
 
 
 def _forced(binding: Binding, text: str) -> tuple[str, bool]:
@@ -153,6 +157,8 @@ class _Heard:
         """Whether a machine has failed, or was stopped."""
         self.lines = 0
         """How many lines of the table stand above, to be written over."""
+        self.forcings: dict[str, Forcing] = {}
+        """What was to be forced, as it was asked for."""
         self.lines_taken: dict[str, str] = {}
         """The devices whose serial line another program has, and how that was told."""
         self.is_to_end = asyncio.Event()
@@ -196,6 +202,13 @@ class _Heard:
     def sending_ended(self) -> None:
         """The driver has driven its safe outputs, and has ended."""
         self._told(f"{_ENDED}, and nothing is read any more")
+
+    def tell_unforced(self) -> bool:
+        """Tell at the end what was to be forced and was not; whether there is anything."""
+        unforced = {text: forcing for text, forcing in self.forcings.items() if not forcing.is_written}
+        for text, forcing in unforced.items():
+            self._told(f"{click.style('error', fg='red')}: --force {text} was not written: {forcing.refused}")
+        return bool(unforced)
 
     def _told(self, line: str) -> None:
         self.lines = 0
@@ -272,14 +285,12 @@ async def _shown(
     driver = BoundDriver(sparing(binding if places else binding.watching(), heard.line_taken), (), frozenset())
     running = asyncio.create_task(_served(driver, heard))
     try:
-        reached = await _connected(driver, running)
         for signal, value in forced:
-            driver.force(signal, value)
+            heard.forcings[f"{signal}={value:d}"] = driver.force(signal, value)
+        reached = await _connected(driver, running)
         for place in places:
             driver.send(place, 0)
-        while not (heard.failed or running.done()) and any(
-            device.is_writing for device in driver.devices.values() if device.is_ready.is_set()
-        ):
+        while not running.done() and _is_writing(driver, heard):
             await asyncio.sleep(0.01)
         if once:
             await asyncio.wait([running], timeout=_REFRESH_SECONDS)  # what is told a moment after the first answer
@@ -297,6 +308,12 @@ async def _shown(
     finally:
         running.cancel()
         await asyncio.gather(running, return_exceptions=True)
+
+
+def _is_writing(driver: BoundDriver, heard: _Heard) -> bool:
+    """Whether a device that is there has not confirmed what it was to be written; no command is, where one failed."""
+    there = [device for device in driver.devices.values() if device.is_ready.is_set()]
+    return any(device.forced or (device.is_writing and not heard.failed) for device in there)
 
 
 async def _served(driver: BoundDriver, heard: _Heard) -> None:

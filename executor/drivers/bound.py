@@ -11,7 +11,7 @@ import asyncio
 from collections.abc import Collection, Mapping, Sequence
 
 from firable.executor.drivers.binding import Binding, CommandDocument
-from firable.executor.drivers.bound_device import LOOK_SECONDS, BoundDevice
+from firable.executor.drivers.bound_device import LOOK_SECONDS, BoundDevice, Forcing
 from firable.executor.drivers.cancelling import ended, uninterrupted
 from firable.executor.drivers.completions import Completions
 from firable.executor.drivers.driver import Answer, Cautious, Clock, Listener, Reading
@@ -195,12 +195,12 @@ class BoundDriver:
             return Answer.UNKNOWN if stopped else Answer.WORKING
         return answer
 
-    def force(self, signal: str, value: bool) -> None:
-        """Write a signal on its device; raises `ValueError` where the binding does not allow it."""
+    def force(self, signal: str, value: bool) -> Forcing:
+        """Write a signal on its device, once; raises `ValueError` where the binding does not allow it."""
         bound = self.binding.document.signals.get(signal)
         if bound is None or not bound.force:
             raise ValueError(f"the binding does not allow '{signal}' to be forced")
-        self.devices[bound.device].force(bound.read, value ^ bound.invert)
+        return self.devices[bound.device].force(bound.read, value ^ bound.invert)
 
     def stop(self) -> None:
         """Drive the safe outputs of every device that can be reached; the others have their watchdogs."""

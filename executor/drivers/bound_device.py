@@ -11,6 +11,7 @@ import asyncio
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from firable.executor.drivers.binding import CommandDocument, SignalDocument, writes
@@ -34,6 +35,17 @@ ANSWERS: Final = 3
 
 _POINTS: Final = "are the points written as the device has them?"
 """What is asked where a device is silent: a topic that is written wrong is no error to a broker."""
+
+
+@dataclass(slots=True)
+class Forcing:
+    """A value that is written beside all else, once: on the connection that stands, or on the first that does."""
+
+    writes: Writes
+    is_written: bool = False
+    """Whether the device has confirmed it."""
+    refused: str = ""
+    """Why it will not be: what ended the connection before the device had confirmed it, or that there is none."""
 
 
 class BoundDevice:
@@ -68,7 +80,8 @@ class BoundDevice:
         heartbeat, alive = self.document.heartbeat, self.document.alive
         self.tripped = None if heartbeat is None else heartbeat.tripped
         self.has_tripped: bool | None = None
-        self.forced: deque[Writes] = deque()
+        self.forced: deque[Forcing] = deque()
+        """What is to be written beside all else."""
         self.writing: Channel | Handshake | None = None
         self.is_ready = asyncio.Event()
         self.was_ready = False
@@ -117,6 +130,7 @@ class BoundDevice:
             for alarm in (self.alarm, self.due, begun, *self.patience.values()):
                 if alarm is not None:
                     alarm.cancel()
+            self._refuse_forced(self._unforced)
 
     async def met(self) -> bool:
         """Wait until there is a connection to it, as long as its start may take; whether there is one."""
@@ -143,10 +157,23 @@ class BoundDevice:
         """Whether something may still come to it that was sent before its first connection here."""
         return asyncio.get_running_loop().time() < self.ready_seconds + self.document.timeout_s
 
-    def force(self, point: Point, value: bool) -> None:
-        """Write a point beside all else."""
-        self.forced.append(((point, value),))
+    def force(self, point: Point, value: bool) -> Forcing:
+        """Write a point beside all else; what is returned says what becomes of it."""
+        if self.driver.is_stopped:
+            return Forcing(((point, value),), refused=self._unforced)
+        self.forced.append(forcing := Forcing(((point, value),)))
         self.kept.awake.set()
+        return forcing
+
+    @property
+    def _unforced(self) -> str:
+        """Why nothing is forced any more once its driver is stopped."""
+        return self.unreached or f"{self.name} was stopped before"
+
+    def _refuse_forced(self, why: str) -> None:
+        """Give up what was to be forced: the device may be something else when there is a connection again."""
+        while self.forced:
+            self.forced.popleft().refused = why
 
     @property
     def is_out_of_reach(self) -> bool:
@@ -270,6 +297,7 @@ class BoundDevice:
         """There is no connection, or none any more."""
         if self.is_ready.is_set():
             self.is_ready.clear()
+            self._refuse_forced(why)
             if self.contacts.contacts:
                 self._emergency(self.contacts.lost(why))
             self._alarm(self.document.grace_s, why)
@@ -297,7 +325,7 @@ class BoundDevice:
         """What is to be written now."""
         self.writing = None
         if self.forced:
-            return self.forced[0]  # until it is confirmed
+            return self.forced[0].writes  # until it is confirmed
         if not self.driver.may_move:
             return None
         for channel in self.channels.values():
@@ -309,7 +337,7 @@ class BoundDevice:
     def written(self) -> None:
         """The device has confirmed that."""
         if (channel := self.writing) is None:
-            self.forced.popleft()
+            self.forced.popleft().is_written = True
         else:
             for outcome in channel.written():
                 self._said(outcome)

@@ -6,17 +6,21 @@ import os
 import signal
 import sys
 import time
+from collections.abc import Sequence
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import pytest
 from serial import Serial
+from support import third_party_driver
 from support.asking import heard
+from support.third_party_driver import MemoryConnection, MemoryEnd, MemoryKind, MemoryOptions
 from support.waiting import PATIENCE_SECONDS
 
 from firable.cli.main import main as firable
-from firable.executor.drivers import serial_line
+from firable.executor.drivers import kinds, serial_line
 from firable.executor.drivers.bench import until
-from firable.executor.drivers.device import InUseError, Point, Value, Wanted
+from firable.executor.drivers.device import InUseError, LinkError, Point, Value, Wanted, Writes
 from firable.executor.drivers.far_side.serial_device import SerialEnd
 from firable.executor.drivers.sparing import Sparing
 
@@ -178,3 +182,73 @@ def test_line_that_was_found_in_use_is_not_asked_for_again() -> None:
     assert told == [f"{port}: another program has it open"]
     os.close(near)
     os.close(far)
+
+
+class Refusing(MemoryConnection):
+    """A connection to a device that shows a key, and takes nothing."""
+
+    async def read(self) -> Sequence[tuple[Point, Value]]:
+        """Show the key, and nothing afterwards."""
+        if self.is_first:
+            self.is_first = False
+            return [("key", 0)]
+        return await super().read()
+
+    async def write(self, writes: Writes) -> None:
+        """Refuse it."""
+        ASKED.append(writes)
+        raise LinkError("it does not take that")
+
+
+class RefusingKind(MemoryKind):
+    """The kind of such devices."""
+
+    async def connect(self, options: MemoryOptions, wanted: Wanted) -> MemoryConnection:
+        """Reach one."""
+        return Refusing(MemoryEnd(options.memory), wanted.timeout_s)
+
+
+ASKED: list[Writes] = []
+FORCED = """
+firable_bind: 1
+cell: arm
+devices:
+  bench: {driver: theirs, memory: refusing, retry_s: 0.02, start_s: 0.5, grace_s: 60}
+signals: {a.key: {device: bench, read: key, force: true}}
+"""
+
+
+@pytest.mark.parametrize("until_when", [("--for", "2"), ("--once",)], ids=lambda option: option[0])
+def test_value_that_a_device_refuses_is_written_once_and_an_error_at_the_end(
+    until_when: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    entry = EntryPoint("theirs", "support.third_party_driver:KIND", kinds.GROUP)
+    monkeypatch.setattr(kinds, "entry_points", lambda **_: [entry])
+    monkeypatch.setattr(third_party_driver, "KIND", RefusingKind())
+    bind = tmp_path / "arm.bind.yaml"
+    bind.write_text(FORCED)
+    ASKED.clear()
+    assert firable(["io", str(bind), "--force", "a.key=1", *until_when]) == 1
+    assert ASKED == [(("key", True),)]
+    said = capsys.readouterr().err.splitlines()
+    assert [line for line in said if "error" in line] == said[-1:]
+    assert said[-1] == "error: --force a.key=1 was not written: it does not take that"
+
+
+def test_value_that_could_not_be_written_is_an_error_also_when_io_is_asked_to_end(tmp_path: Path) -> None:
+    bind = tmp_path / "arm.bind.yaml"
+    bind.write_text(FORCED.replace("driver: theirs, memory: refusing", "driver: serial, port: /dev/nobody-is-here"))
+
+    async def main() -> tuple[int | None, str]:
+        with heard(signal.SIGTERM):
+            process = await io(bind, "--force", "a.key=1")
+        assert process.stdout is not None
+        shown = b""
+        while b"a.key" not in shown:  # when its start is over
+            shown = await asyncio.wait_for(process.stdout.readline(), PATIENCE_SECONDS)
+        process.send_signal(signal.SIGTERM)
+        _, said = await asyncio.wait_for(process.communicate(), PATIENCE_SECONDS)
+        return process.returncode, said.decode().splitlines()[-1]
+
+    why = "bench is not connected: /dev/nobody-is-here: No such file or directory"
+    assert asyncio.run(main()) == (1, f"error: --force a.key=1 was not written: {why}")
