@@ -225,11 +225,15 @@ def _family_of(loop: ClosedLoop, of: Property | TemporalProperty) -> Family:
 
 
 def _unclear(model: PlantModel, of: Property | TemporalProperty) -> bool:
-    """Whether a property speaks of a deadlock in a way that a sensor which never rests would make empty."""
+    """Whether a property speaks of a deadlock in a way that what never rests would make empty.
+
+    That is a sensor, or a station at which workpieces arrive and leave, whatever the cell does.
+    """
     if isinstance(of, Property) and of.kind is PropertyKind.NEVER and of.formula == Deadlock():
         return False
     restless = any(sensor.may_flicker or sensor.may_linger or sensor.acknowledges for sensor in model.sensors.values())
-    return restless and _speaks_of_deadlock(of)
+    passing = model.arrivals.station == model.departures.station
+    return (restless or passing) and _speaks_of_deadlock(of)
 
 
 def _speaks_of_deadlock(part: object) -> bool:
@@ -249,7 +253,8 @@ def _not_asked(of: Property | TemporalProperty) -> Verdict:
         Status.UNKNOWN,
         said,
         "not asked",
-        bound="with a sensor that may flicker or linger something always moves, so no marking is a `deadlock`",
+        bound="with a sensor that may flicker or linger, or a station at which workpieces arrive and leave, something "
+        "always moves, so no marking is a `deadlock`",
         hint="say what must not hang by `always_possible`",
         discipline="interleaving",
     )

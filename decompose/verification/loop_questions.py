@@ -189,10 +189,12 @@ class Asked:
         return type(part)(**{one.name: self.in_loop(getattr(part, one.name)) for one in fields(part)})
 
     def unclear(self, prop: Property | TemporalProperty) -> bool:
-        """Whether a property speaks of deadlocks where a sensor never comes to rest; then it is not asked."""
-        sensors = self.plant.model.sensors.values()
+        """Whether a property speaks of deadlocks where sensors or workpieces never come to rest; then it is not asked."""
+        model = self.plant.model
+        sensors = model.sensors.values()
         restless = any(one.may_flicker or one.may_linger or one.acknowledges is not None for one in sensors)
-        return restless and not _never_a_deadlock(prop) and _speaks_of_deadlock(prop)
+        passes = model.departures.station == model.arrivals.station
+        return (restless or passes) and not _never_a_deadlock(prop) and _speaks_of_deadlock(prop)
 
 
 def _never_a_deadlock(prop: Property | TemporalProperty) -> bool:

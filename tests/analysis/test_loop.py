@@ -225,6 +225,37 @@ def test_a_deadlock_within_a_formula_is_unknown_where_a_sensor_never_rests() -> 
     assert steady.verdict("loop.property.inner").status is Status.VIOLATED
 
 
+def test_a_deadlock_within_a_formula_is_unknown_where_workpieces_come_and_go_at_one_station() -> None:
+    net = parse_net("""
+firable: 1
+cell: hangs
+controllers:
+  a: {start: p, places: {p: , q: {send: {machine: M, command: GO}, until: done}, r: }}
+transitions:
+  begins: {from: a.p, to: a.q}
+  ends: {from: a.q, to: a.r}
+properties:
+  never: {never: deadlock}
+  always: {always: not deadlock}
+  reached: {reachable: deadlock and a.r}
+""")
+    for leaves, found in (
+        ("there", ("violated", "unknown", "unknown")),
+        ("elsewhere", ("violated", "violated", "proved")),
+    ):
+        plant = parse_plant(f"""
+firable_plant: 1
+plant: hangs
+stations: [there, elsewhere]
+arrivals: {{station: there, every_s: 8}}
+departures: {{station: {leaves}, after_s: 1}}
+machines:
+  M: {{commands: {{GO: {{does: work, takes_s: 1}}}}}}
+""")
+        report = check_loop(net, plant)
+        assert tuple(str(report.verdict(f"loop.property.{one.name}").status) for one in net.properties) == found
+
+
 def test_a_budget_that_ends_leaves_the_loop_unknown() -> None:
     net, plant = catalogue_net("one_robot"), catalogue_plant("one_robot")
     report = check_loop(net, plant, Budget(markings=20, seconds=0.0))
