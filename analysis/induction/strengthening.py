@@ -23,6 +23,7 @@ from typing import Final
 
 from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.certificate import Clause, Equation
+from firable.analysis.structure.asking import WEIGHTS_MAX
 from firable.analysis.structure.invariants import p_invariants
 from firable.analysis.structure.ordinary import ordinary
 from firable.analysis.structure.siphons import largest_siphon, trap_rules
@@ -55,7 +56,8 @@ def structural_facts(net: Net, deadline: Deadline) -> Facts:
     share = min(_SECONDS_MAX, inf if left is None else left * _SHARE)
     found = p_invariants(net, deadline=deadline.within(share)).minimal
     equations, size = list[Equation](), 0
-    for invariant in sorted(found, key=lambda one: len(one.weights)):
+    light = (one for one in found if sum(weight for _, weight in one.weights) <= WEIGHTS_MAX)
+    for invariant in sorted(light, key=lambda one: len(one.weights)):
         size += len(invariant.weights)
         if size > _SIZE_MAX * len(net.places):
             break

@@ -17,6 +17,8 @@ import z3
 from firable.analysis.deadline import Deadline
 from firable.analysis.induction.smt import SEED
 
+WEIGHTS_MAX: Final = 2**31 - 1
+"""What the weights of a pseudo-Boolean constraint may come to together, or z3 refuses it."""
 _POLL_SECONDS: Final = 0.05
 
 

@@ -24,7 +24,7 @@ import z3
 
 from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.certificate import Inequality
-from firable.analysis.structure.asking import answer, solver_of
+from firable.analysis.structure.asking import WEIGHTS_MAX, answer, solver_of
 from firable.analysis.structure.linear import Sparse
 from firable.nets.net import Net
 
@@ -81,7 +81,10 @@ class Refuter:
         self.solver.from_string("\n".join(lines))
 
     def inequality(self, full: Iterable[int], empty: Iterable[int], deadline: Deadline) -> AtLeast | None:
-        """An inequality that no marking with these places full and these empty satisfies; None where none was found."""
+        """An inequality that no marking with these places full and these empty satisfies.
+
+        None where none was found whose weights a solver takes.
+        """
         chosen, without = set(full), set(empty)
         # The most that a M can be, and what it is in M0: the weights are scaled so that they are 1 apart at least.
         most = [f"{'a' if p in chosen else 'u'}{p}" for p in range(self.n_places) if p not in without]
@@ -106,6 +109,8 @@ class Refuter:
         whole = {p: numerator * (scale // denominator) for p, (numerator, denominator) in fractions.items()}
         divisor = gcd(*whole.values())
         weights = {p: weight // divisor for p, weight in whole.items()}
+        if sum(map(abs, weights.values())) > WEIGHTS_MAX:
+            return None
         found = AtLeast(tuple(weights.items()), sum(weight for p, weight in weights.items() if p in self.marked))
         self._check(found, chosen, without)
         return found

@@ -24,6 +24,8 @@ from firable.analysis.induction.k_induction import decide_by_k_induction
 from firable.analysis.induction.pdr import decide_by_pdr
 from firable.analysis.induction.smt import Answer, Terms, decide
 from firable.analysis.induction.strengthening import Facts, Traps, structural_facts
+from firable.analysis.structure.invariants import p_invariants
+from firable.analysis.structure.state_equation import decide_by_state_equation
 from firable.nets.catalogue import catalogue_net
 from firable.nets.catalogue.families import family_net
 from firable.nets.diagnostics import InputError
@@ -200,6 +202,29 @@ def test_an_invariant_is_found_where_the_arcs_say_nothing(monkeypatch: pytest.Mo
 def test_a_place_that_no_token_can_come_to_is_known_to_stay_empty() -> None:
     net = Net("n", (Place("a", marked=True), Place("b")), (Transition("t", ("b",), ()),))
     assert structural_facts(net, Deadline()).clauses == (Clause(empty=("b",)),)
+
+
+def doubling(stages: int) -> Net:
+    """Each stage splits a token, and either half goes on: p0 weighs 2 ** stages times the last place."""
+    places, transitions = [Place("p0", marked=True)], []
+    for i in range(stages):
+        whole, halves, after = f"p{i}", (f"a{i}", f"b{i}"), f"p{i + 1}"
+        places += [Place(name) for name in (*halves, after)]
+        transitions.append(Transition(f"s{i}", (whole,), halves))
+        transitions += [Transition(f"{half}_goes_on", (half,), (after,)) for half in halves]
+    return Net("doubling", tuple(places), tuple(transitions))
+
+
+@pytest.mark.parametrize("decide_by", [decide_by_k_induction, decide_by_pdr, decide_by_state_equation])
+def test_invariants_that_weigh_more_than_a_solver_takes_are_done_without(
+    decide_by: Callable[[Net, Formula, Limits], Finding],
+) -> None:
+    net = doubling(40)
+    assert max(weight for one in p_invariants(net).minimal for _, weight in one.weights) == 2**40
+    assert structural_facts(net, Deadline()).equations == ()
+    assert structural_facts(doubling(20), Deadline()).equations != ()
+    goal = And((Holds("p39"), Not(Holds("a0"))))
+    assert decide_by(net, goal, Limits(Deadline.after(2))).reachable is not False
 
 
 def test_deadlock_is_excluded_by_a_marked_trap() -> None:
