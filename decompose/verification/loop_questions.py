@@ -189,7 +189,7 @@ class Asked:
         return type(part)(**{one.name: self.in_loop(getattr(part, one.name)) for one in fields(part)})
 
     def unclear(self, prop: Property | TemporalProperty) -> bool:
-        """Whether a property speaks of deadlocks where sensors or workpieces never come to rest; then it is not asked."""
+        """Whether a property speaks of deadlocks where sensors or workpieces never rest; then it is not asked."""
         model = self.plant.model
         sensors = model.sensors.values()
         restless = any(one.may_flicker or one.may_linger or one.acknowledges is not None for one in sensors)
