@@ -198,7 +198,7 @@ class Plant:
 
     def stand(self, machine: str) -> None:
         """Stop one machine where it is; what it was at is never done, and it may be commanded again."""
-        self.machines[machine].busy = self.machines[machine].breaks_off = None
+        self._rest(machine)
 
     def command(
         self, now_seconds: float, machine: str, command: str, parameters: Mapping[str, str], ticket: Ticket
@@ -332,10 +332,15 @@ class Plant:
         if not self._take_effect(name, busy):
             machine.busy = replace(busy, waits=True)
             return
+        self._rest(name)
+        yield CommandDone(busy.ticket)
+
+    def _rest(self, name: str) -> None:
+        """Let a machine stand: somebody acknowledges later that what a stop was to break off is."""
+        machine = self.machines[name]
         for key, sensor in self._keys(name) if machine.breaks_off is not None else ():
             self._in(sensor.after_s, 0.0, _Press(key))
         machine.busy = machine.breaks_off = None
-        yield CommandDone(busy.ticket)
 
     def _take_effect(self, name: str, busy: _Busy) -> bool:
         """Do what a command does in the end, and say whether it is done: on a full station it may have to wait."""

@@ -228,6 +228,17 @@ def test_stop_that_takes_time_is_done_at_rest_and_what_was_not_near_its_end_is_l
     assert bench.do("R", "MOVE", to="ENTRY") == [SensorChanged("key", value=False), CommandDone(4)]
 
 
+def test_key_is_pressed_after_a_stop_that_the_safe_outputs_cut_short() -> None:
+    bench = Bench(text=STOPPABLE)
+    bench.give("R", "MOVE", to="ENTRY")
+    bench.wait(0.5)
+    bench.give("R", "STOP")
+    bench.wait(0.25)
+    bench.plant.stand("R")
+    assert bench.wait(1.0) == []
+    assert bench.wait(1.0) == [SensorChanged("key", value=True)]
+
+
 def test_what_a_stop_breaks_off_near_its_end_may_still_be_done_before_the_machine_rests_and_no_one_is_told() -> None:
     seen = set()
     for seed in range(20):
