@@ -169,6 +169,7 @@ def _write(
     storages = {file: Storage(new_name()) for file in journals}
     of = {name: storages[file] for file, names in journals.items() for name in names}
     with TemporaryDirectory() as aside:
+        witnesses: dict[str, bytes] = {}
         whole: dict[str, bytes] = {}
         for number, (file, names) in enumerate(journals.items()):
             written = Path(aside, str(number))
@@ -182,8 +183,9 @@ def _write(
                 if others.known:
                     journal.write(HOSTS, keeping(others))
                 sync_now(journal)
-            whole[str(witness_of(file))], whole[file] = witness_of(written).read_bytes(), written.read_bytes()
-        for file, data in whole.items():  # a witness without its journal is refused, and nothing begins anew
+            witnesses[str(witness_of(file))], whole[file] = witness_of(written).read_bytes(), written.read_bytes()
+        # A witness without its journal is refused: a host that is to go on does not begin anew where this is killed.
+        for file, data in (*witnesses.items(), *whole.items()):
             write_whole(file, data)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import closing
+from contextlib import closing, nullcontext
 from pathlib import Path
 
 import pytest
@@ -233,5 +233,33 @@ def test_a_takeover_that_breaks_off_leaves_no_journal_that_begins_anew(
                 with closing(SqliteJournal(new, read_bundle(bundles[1]).digest, machines)) as opened:
                     assert all(opened.kept(machine) for machine in machines)
             elif Path(f"{new}.generation").exists():
+                with pytest.raises(InputError, match="F5032"):
+                    SqliteJournal(new, read_bundle(bundles[1]).digest, machines)
+
+
+def test_a_takeover_that_is_killed_lets_no_host_begin_anew_beside_one_that_goes_on(
+    bundles: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    written: list[str] = []
+
+    def killed(path: Path | str, data: bytes | str) -> None:
+        if len(written) == at:
+            raise KeyboardInterrupt
+        written.append(str(path))
+        write_whole(path, data)
+
+    monkeypatch.setattr("firable.cli.takeover._removed_if_it_fails", lambda _: nullcontext())
+    monkeypatch.setattr("firable.nets.writing.write_whole", killed)
+    for at in range(6):
+        folder = tmp_path / str(at)
+        folder.mkdir()
+        written.clear()
+        assert main(["takeover", *map(str, bundles), *hosts(bundles, folder)]) == 3
+        capsys.readouterr()
+        journals = [folder / f"{name}.new" for name in HOSTS_OF_OLD]
+        goes_on = any(new.exists() for new in journals)
+        assert goes_on is (at > len(journals))
+        for new, machines in zip(journals, HOSTS_OF_OLD.values(), strict=True):
+            if goes_on and not new.exists():
                 with pytest.raises(InputError, match="F5032"):
                     SqliteJournal(new, read_bundle(bundles[1]).digest, machines)
