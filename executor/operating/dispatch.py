@@ -2,7 +2,8 @@
 
 A net cannot tell a slow machine from a dead one; only time does. So a command that is not over in time is a fault: one
 with a completion is over when that has come, one without when its machine has taken it. A place with `within` says in
-the net what follows when its time is over (`time_limits.py`), and needs no alarm.
+the net what follows when its time is over (`time_limits.py`). There the alarm is for when that does not follow, as
+where a promise keeps what the timeout would change: its time begins when that of the place is over.
 
 That a machine has taken a command outlives this process: one that was switched off and on since shows that it has never
 had it, and is not believed (`was_taken`). It may have done it by halves, and would do it twice.
@@ -87,14 +88,17 @@ class Dispatch:
         if places:
             for name in withdraw(self.run.driver, places, self.run.acts.outbox):
                 self.run.recorder.note(self.run.now_seconds(), "withdrawn", place=name)
+            for place in places:
+                if place.within is not None:
+                    self.over(str(place.completion))
 
     def watch(self, place: str, entry: int) -> None:
         """Await the end of a place's command from now on."""
         sender, clock = self.run.net.place(place), self.run.clock
-        if sender.within is None and clock is not None:
+        if clock is not None:
             awaited = sender.completion or place
             self.over(awaited)
-            delay = self.overdue_seconds / clock.speed
+            delay = (_limit_seconds(sender) + self.overdue_seconds) / clock.speed
             self.timers[awaited] = clock.loop.call_later(delay, self._overdue, place, entry, clock.now_seconds())
 
     def over(self, awaited: str) -> None:
@@ -109,15 +113,25 @@ class Dispatch:
 
     def _overdue(self, place: str, entry: int, sent_at: float) -> None:
         sender = self.run.net.place(place)
+        if sender.within is not None and self.run.paused:  # what follows does when the run is resumed
+            self.watch(place, entry)
+            return
         self.timers.pop(sender.completion or place, None)
         awaited = "its machine has not shown that it took it"
         if sender.completion is not None:
             taken = "it counts as taken" if was_taken(self.run.journal, place, entry) else awaited
             awaited = f"{taken}, and '{sender.completion}' has not come"
-        self.run.fail(
-            f"'{sender.command}' of '{place}', sent at {sent_at:.1f} s, is overdue: "
-            f"{awaited} within {self.overdue_seconds:g} s"
-        )
+        if sender.within is None:
+            late = f"{awaited} within {self.overdue_seconds:g} s"
+        else:
+            limit = f"{_limit_seconds(sender):g} s, nor its timeout in {self.overdue_seconds:g} s more"
+            late = f"{awaited} within its {limit}"
+        self.run.fail(f"'{sender.command}' of '{place}', sent at {sent_at:.1f} s, is overdue: {late}")
+
+
+def _limit_seconds(sender: Place) -> float:
+    """How long the net lets the command of a place take; nothing where it does not say."""
+    return 0.0 if sender.within is None else sender.within.milliseconds / 1000
 
 
 def _left_behind(net: Net) -> dict[tuple[str, str], list[Place]]:

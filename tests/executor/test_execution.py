@@ -145,6 +145,56 @@ def test_command_that_never_completes_is_a_fault_and_not_a_deadlock() -> None:
     assert len(report.delivered) == 1
 
 
+JAMMED = """
+firable: 1
+cell: jammed
+controllers:
+  r:
+    start: [free, stuck]
+    places: {free: , stuck: , moves: {send: {machine: M, command: GO}, until: moved, within: {time: 5s, to: stuck}}}
+transitions:
+  go: {from: r.free, to: r.moves}
+  come: {from: r.moves, to: r.free}
+"""
+MOVER = """
+firable_plant: 1
+plant: jammed
+stations: [s]
+arrivals: {station: s, every_s: 8}
+departures: {station: s, after_s: 1}
+machines:
+  M: {commands: {GO: {does: work, takes_s: 1}}}
+"""
+
+
+@pytest.mark.parametrize("paused_seconds", [0.0, 300.0])
+def test_a_timed_command_is_overdue_where_its_timeout_cannot_fire_but_not_in_a_pause(paused_seconds: float) -> None:
+    seen: list[State] = []
+
+    async def pausing(host: Host) -> None:
+        while "r.moves" not in host.marking:
+            await asyncio.sleep(0.05)
+        if paused_seconds:
+            assert host.pause()
+            await asyncio.sleep(paused_seconds)
+            seen.append(host.situation().state)
+            assert host.resume()
+        await asyncio.sleep(1000.0)
+
+    report = execute(
+        split(parse_net(JAMMED)),
+        parse_plant(MOVER),
+        workpieces=1,
+        overdue_seconds=60.0,
+        disturbances=[NeverCompletes("M", "GO", 1)],
+        operator=pausing,
+    )
+    assert seen == ([State.PAUSED] if paused_seconds else [])
+    assert report.state is State.FAULT
+    assert "is overdue: it counts as taken" in report.situation.message
+    assert report.situation.message.endswith("'r.moved' has not come within its 5 s, nor its timeout in 60 s more")
+
+
 def test_completion_is_formed_where_its_sensor_drops_at_the_same_instant() -> None:
     # So it is, too, where a slow host learns at one time of all that has happened in the meantime.
     report, _ = run_cell("one_robot", 3, plant=replace_text("one_robot", "after_s: 1", "after_s: 0"))
