@@ -120,13 +120,15 @@ class Groups:
             self.run.told("fault", f"{message}; {hint}")
             self.run.broken(InputError([Diagnostic(code, message, hint)]))
 
-    async def write_last(self, patience: Patience) -> str:
+    async def write_last(self, patience: Patience, *, has_news: bool) -> str:
         """Write the lines of the trace that are left, and what machines have taken, or others said, since the sync.
 
-        Returns a sentence where that had to be given up. Raises `InputError` F1017 or F5034 where it fails.
+        `has_news` says that the journal has something else to store. Returns a sentence where that had to be given up.
+        Raises `InputError` F1017 or F5034 where it fails.
         """
         self.run.recorder.may_write |= self.run.acquaintances.is_alive
-        sync = self.run.journal.sync() if self.storing is None else None
+        has_news |= self.run.link is not None or not self.run.dispatch.is_taken_kept
+        sync = self.run.journal.sync() if has_news and self.storing is None else None
         if last := [one for one in (sync, self.run.recorder.writing()) if one is not None]:
             storing = asyncio.get_running_loop().run_in_executor(None, _store, last)
             if await uncut([storing], patience):

@@ -17,8 +17,8 @@ machine by itself (EN ISO 13850, 4.1.4).
 The process ends as before where nobody could reset it; where the end was asked for as well; where something failed
 besides: a fault, a driver that hangs. Where a device has not confirmed its safe outputs it stays, and goes on trying.
 
-The journal holds an emergency stop until it is reset, or the process has ended in order. So what follows one that was
-killed meanwhile begins latched, too; and where nobody can reset it there, held, whatever was said beforehand.
+The journal holds an emergency stop that can be reset until it is, or the process has ended in order. So what follows
+one that was killed meanwhile begins latched, too; and where nobody can reset it there, held, whatever was said before.
 
 Rejected: to go on with the machines of the protocol as they are, held anew. It is shorter, and a second way back that
 must be right in every marking. Rejected: a fault that latches likewise. A fault is of the program or of a device that
@@ -61,10 +61,12 @@ class Latch:
     was_reset: asyncio.Event = field(default_factory=asyncio.Event)
 
 
-def keep(run: Host, reason: str | None) -> None:
-    """Have the journal hold that there was an emergency stop, or with None that there is none any more."""
-    if run.journal.kept(TRACE).get(_EMERGENCY) != reason:
+def keep(run: Host, reason: str | None) -> bool:
+    """Have the journal hold that there was an emergency stop, or with None that there is none; whether that is news."""
+    is_news = run.journal.kept(TRACE).get(_EMERGENCY) != reason
+    if is_news:
         run.journal.write(TRACE, [Keep(_EMERGENCY, reason)])
+    return is_news
 
 
 def go_on(run: Host) -> None:

@@ -40,9 +40,9 @@ async def to_the_end(run: Host) -> Situation:
     ended = ending.with_hanging(ended, hanging)
     if run.left_nothing_open:
         run.recorder.end(run.now_seconds(), run.marking, ended.state.value)
-    latch.keep(run, None)
+    is_let_go = latch.keep(run, None)
     try:
-        if unwritten := await run.groups.write_last(run.patience):
+        if unwritten := await run.groups.write_last(run.patience, has_news=is_let_go):
             run.tell_operator("fault", unwritten)  # before anybody waits for its thread
             ended = ending.with_fault(ended, unwritten)
     except InputError as error:

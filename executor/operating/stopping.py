@@ -51,7 +51,8 @@ def emergency_stop(run: Host, reason: str) -> None:
     """Drive the safe outputs at once, before anything is written or said; it can be reset, or the run ends."""
     run.make_safe()
     run.emergency = reason
-    latch.keep(run, reason)
+    if latch.may_stay(run):
+        latch.keep(run, reason)
     run.peers.meeting.set()  # a driver that has waited for others waits no longer
     _end_soon(run, "emergency stop", reason=reason)
 
