@@ -209,22 +209,26 @@ def test_a_host_of_which_the_new_net_has_nothing_has_no_journal(
     assert not (tmp_path / "spare.new").exists()
 
 
+class Breaking:
+    """Writes so many files whole, and is interrupted at the next."""
+
+    left = 0
+
+    def __call__(self, path: Path | str, data: bytes | str) -> None:
+        if self.left == 0:
+            raise KeyboardInterrupt
+        self.left -= 1
+        write_whole(path, data)
+
+
 def test_a_takeover_that_breaks_off_leaves_no_journal_that_begins_anew(
     bundles: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    written: list[str] = []
-
-    def breaking(path: Path | str, data: bytes | str) -> None:
-        if len(written) == at:
-            raise KeyboardInterrupt
-        written.append(str(path))
-        write_whole(path, data)
-
-    monkeypatch.setattr("firable.nets.writing.write_whole", breaking)
+    monkeypatch.setattr("firable.nets.writing.write_whole", breaking := Breaking())
     for at in range(6):
         folder = tmp_path / str(at)
         folder.mkdir()
-        written.clear()
+        breaking.left = at
         assert main(["takeover", *map(str, bundles), *hosts(bundles, folder)]) == 3
         capsys.readouterr()
         for name, machines in HOSTS_OF_OLD.items():
@@ -240,20 +244,12 @@ def test_a_takeover_that_breaks_off_leaves_no_journal_that_begins_anew(
 def test_a_takeover_that_is_killed_lets_no_host_begin_anew_beside_one_that_goes_on(
     bundles: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    written: list[str] = []
-
-    def killed(path: Path | str, data: bytes | str) -> None:
-        if len(written) == at:
-            raise KeyboardInterrupt
-        written.append(str(path))
-        write_whole(path, data)
-
     monkeypatch.setattr("firable.cli.takeover._removed_if_it_fails", lambda _: nullcontext())
-    monkeypatch.setattr("firable.nets.writing.write_whole", killed)
+    monkeypatch.setattr("firable.nets.writing.write_whole", breaking := Breaking())
     for at in range(6):
         folder = tmp_path / str(at)
         folder.mkdir()
-        written.clear()
+        breaking.left = at
         assert main(["takeover", *map(str, bundles), *hosts(bundles, folder)]) == 3
         capsys.readouterr()
         journals = [folder / f"{name}.new" for name in HOSTS_OF_OLD]
