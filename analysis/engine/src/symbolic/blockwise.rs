@@ -39,7 +39,7 @@ struct Stage {
 }
 
 impl Symbolic {
-    /// The firings that lead from a marking into a set that can be reached from it; the marking goes with them.
+    /// The firings that lead from a marking into a set of reachable ones that it leads into; the marking goes with them.
     pub(super) fn block_by_block(
         &mut self,
         roots: &[Node],
@@ -81,10 +81,10 @@ impl Symbolic {
         }
     }
 
-    /// The transitions by the highest block that they have to do with.
+    /// The transitions that change something, by the highest block that they have to do with.
     fn by_block(&self, moves: &Moves) -> Vec<Vec<usize>> {
         let mut found = vec![Vec::new(); self.blocks().len() + 1];
-        for t in 0..moves.len() {
+        for t in (0..moves.len()).filter(|&t| moves.flipped(t).next().is_some()) {
             if let Some(level) = moves.levels(t).max() {
                 found[self.blocks().of(level) as usize].push(t);
             }

@@ -107,9 +107,11 @@ impl Moves {
 impl Symbolic {
     /// A firing sequence into a set of reachable markings; None where the set is empty.
     pub fn walk_to(&mut self, roots: &[Node], targets: Node, watch: &mut Watch<'_>) -> Result<Option<Walk>, Stop> {
+        let targets = self.binary(roots, Binary::Intersection, targets, self.reach, watch)?;
         if targets == EMPTY {
             return Ok(None);
         }
+        let roots = &[roots, &[targets]].concat();
         let moves = Moves::of(self);
         if let Some(walk) = self.by_layers(roots, targets, &moves, self.layers_work, watch)? {
             return Ok(Some(walk));
