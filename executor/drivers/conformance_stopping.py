@@ -224,6 +224,8 @@ class StoppingConformance:
                 b.machine.show("button", value=True)
                 b.driver.send(b.place("halt"), 1)
                 await until(lambda: len(b.machine.outputs) > driven, "the safe outputs")
+            assert set(b.machine.outputs) == {False}
+            assert len(b.machine.outputs) == 2 or b.far.through_broker
             assert b.heard.emergencies == ["D: 'button' is open"]
             assert b.machine.events[-1] == "output"
             assert len(b.machine.orders) == 1
@@ -405,6 +407,8 @@ class StoppingConformance:
                 driven = len(b.machine.outputs)
                 await b.far.end.mend()
                 await until(lambda: len(b.machine.outputs) > driven, "the safe outputs of another connection")
+                assert set(b.machine.outputs) == {False}
+                assert len(b.machine.outputs) == 2 or b.far.through_broker
                 b.machine.show("button", value=True)
                 await until(lambda: not b.driver.against(), "nothing is against it")
                 assert b.machine.orders == []
