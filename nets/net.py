@@ -96,6 +96,11 @@ class TimeLimit:
     milliseconds: int
     timer: str
 
+    @property
+    def seconds(self) -> float:
+        """The same in seconds."""
+        return self.milliseconds / 1000
+
 
 @dataclass(frozen=True, slots=True)
 class Place:

@@ -98,7 +98,8 @@ class Dispatch:
         if clock is not None:
             awaited = sender.completion or place
             self.over(awaited)
-            delay = (_limit_seconds(sender) + self.overdue_seconds) / clock.speed
+            limit = 0.0 if sender.within is None else sender.within.seconds
+            delay = (limit + self.overdue_seconds) / clock.speed
             self.timers[awaited] = clock.loop.call_later(delay, self._overdue, place, entry, clock.now_seconds())
 
     def over(self, awaited: str) -> None:
@@ -124,14 +125,9 @@ class Dispatch:
         if sender.within is None:
             late = f"{awaited} within {self.overdue_seconds:g} s"
         else:
-            limit = f"{_limit_seconds(sender):g} s, nor its timeout in {self.overdue_seconds:g} s more"
-            late = f"{awaited} within its {limit}"
+            limit = f"{sender.within.seconds:g} s"
+            late = f"{awaited} within its {limit}, nor its timeout in {self.overdue_seconds:g} s more"
         self.run.fail(f"'{sender.command}' of '{place}', sent at {sent_at:.1f} s, is overdue: {late}")
-
-
-def _limit_seconds(sender: Place) -> float:
-    """How long the net lets the command of a place take; nothing where it does not say."""
-    return 0.0 if sender.within is None else sender.within.milliseconds / 1000
 
 
 def _left_behind(net: Net) -> dict[tuple[str, str], list[Place]]:

@@ -86,7 +86,7 @@ class Timers:
                 continue  # another command may share the completion, and clear it before the token has gone on
             elif due == -inf:
                 if name not in held:
-                    self.running[name] = now_seconds + limit.milliseconds / 1000
+                    self.running[name] = now_seconds + limit.seconds
             elif due <= now_seconds + RESOLUTION_SECONDS:
                 del self.running[name]
                 yield name

@@ -52,7 +52,7 @@ def limited(subnet: Net) -> tuple[Limited, ...]:
         if (within := place.within) is not None:
             token, done, over = 1 << subnet.place_index[place.name], bit(place.completion), bit(within.timer)
             completion = place.completion or ""
-            yield Limited(place.name, within.milliseconds / 1000, within.timer, completion, token, done, over)
+            yield Limited(place.name, within.seconds, within.timer, completion, token, done, over)
 
     return tuple(each for place in subnet.places for each in of(place))
 
