@@ -321,7 +321,7 @@ class _Check:
             settling.learn(of, {verdict.name for verdict in open_()}, _moment(self.deadline, share, of))
             settling.conclude(report.verdicts)
         fired = self._fired(report.space) if open_() else set()
-        waiting = [verdict for verdict in open_() if settling.may_ask(verdict, fired)]
+        waiting = [verdict for verdict in open_() if settling.may_ask(verdict)]
         for left, verdict in zip(range(len(waiting), 0, -1), waiting, strict=True):
             settling.ask(verdict, fired, lanes, _share(self.deadline, 1 / left), slices_seconds)
             settling.conclude(report.verdicts)

@@ -32,7 +32,7 @@ from firable.analysis.verdicts.behaviour import QUESTIONS
 from firable.analysis.verdicts.bounds import greatest
 from firable.analysis.verdicts.combined import combined, is_combined
 from firable.analysis.verdicts.consequences import consequences
-from firable.analysis.verdicts.goals import Goal, goals_of, query_goals
+from firable.analysis.verdicts.goals import Goal, goals_of, is_of_the_net, query_goals
 from firable.analysis.verdicts.starvation import STARVATION
 from firable.nets.formula import Count, Formula, format_count
 from firable.nets.net import Net, TemporalProperty
@@ -108,14 +108,12 @@ class Settling:
             self._settle(_QUESTIONS[name], known.answer, known.method, Cost(seconds=0.0))
         self._pass_on(decided | self.found)
 
-    def may_ask(self, verdict: Verdict, fired: Collection[str]) -> bool:
-        """Whether `ask` has anything to ask: the verdict comes down to goals, not too many, a formula or a bound."""
-        if (asked := self._goals(verdict, fired)) is not None:
-            return len(asked[1]) <= _GOALS_MAX
-        return self._formula_of(verdict.name) is not None or self._bound_of(verdict.name) is not None
-
-    def _goals(self, verdict: Verdict, fired: Collection[str]) -> tuple[Question, tuple[Goal, ...]] | None:
-        return goals_of(self.net, verdict.name, fired) or query_goals(self.queries, verdict)
+    def may_ask(self, verdict: Verdict) -> bool:
+        """Whether `ask` may have anything to ask: the verdict comes down to goals, to a formula, or to a bound."""
+        name = verdict.name
+        if is_of_the_net(name) or self._formula_of(name) is not None or self._bound_of(name) is not None:
+            return True
+        return goals_of(self.net, name) is not None or query_goals(self.queries, verdict) is not None
 
     def ask(
         self,
@@ -131,7 +129,7 @@ class Settling:
         """
         if verdict.name in self.found or not lanes:
             return
-        asked = self._goals(verdict, fired)
+        asked = goals_of(self.net, verdict.name, fired) or query_goals(self.queries, verdict)
         if asked is None:
             self._by_formula(verdict, lanes, deadline, slices_seconds)
             return

@@ -10,8 +10,9 @@ Liveness, reversibility and response are no such questions: they speak of what r
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Final
 
 from firable.analysis.question import Question, listed
 from firable.analysis.temporal.queries import as_goal, temporal_question
@@ -52,32 +53,39 @@ class Goal:
     subjects: tuple[str, ...] = ()
 
 
+_Maker = Callable[[Net, Collection[str]], tuple[Goal, ...]]
+_MAKERS: Final[tuple[tuple[Question, _Maker], ...]] = (
+    (CONTACT_FREE, lambda net, _: _never(_contact(net), lambda marking: _told_of_contact(net, marking))),
+    (DEADLOCK_FREE, lambda *_: _never(Deadlock(), lambda _: ((), "a marking of the net is a deadlock"))),
+    (QUASI_LIVE, lambda net, fired: tuple(_firing(t.name) for t in net.transitions if t.name not in fired)),
+    (COMMANDS_AGREE, lambda net, _: _apart(net, command_clashes(net))),
+    (COMPLETIONS_APART, lambda net, _: _apart(net, completion_clashes(net))),
+)
+_OF_THE_NET: Final[Mapping[str, tuple[Question, _Maker]]] = {made[0].name: made for made in _MAKERS}
+"""The questions about the net itself that come down to goals, and what makes these, by the name of the verdict."""
+
+
+def is_of_the_net(name: str) -> bool:
+    """Whether a verdict is one on the net itself that comes down to goals, which take seconds to make of large nets."""
+    return name in _OF_THE_NET
+
+
 def goals_of(net: Net, name: str, fired: Collection[str] = ()) -> tuple[Question, tuple[Goal, ...]] | None:
     """The question of a verdict and its goals; None where the verdict does not come down to goals.
 
     `fired` are transitions that are known to fire, so that nothing needs to be asked of them.
     """
-    match name:
-        case "contact-free":
-            return CONTACT_FREE, _never(_contact(net), lambda marking: _told_of_contact(net, marking))
-        case "deadlock-free":
-            return DEADLOCK_FREE, _never(Deadlock(), lambda _: ((), "a marking of the net is a deadlock"))
-        case "quasi-live":
-            missing = (t.name for t in net.transitions if t.name not in fired)
-            return QUASI_LIVE, tuple(Goal(Firable(t), lambda _: ((), ""), wanted=True, subjects=(t,)) for t in missing)
-        case "conflicting-commands":
-            return COMMANDS_AGREE, _apart(net, command_clashes(net))
-        case "shared-completions":
-            return COMPLETIONS_APART, _apart(net, completion_clashes(net))
-        case _ if name.startswith("property."):
-            of = next(of for of in net.properties if f"property.{of.name}" == name)
-            if isinstance(of, TemporalProperty):
-                goal = as_goal(of.formula)
-                return None if goal is None else (temporal_question(of), (_goal(*goal),))
-            goals = _property(of)
-            return None if goals is None else (Question(name, statement(of)), goals)
-        case _:
-            return None
+    if name in _OF_THE_NET:
+        question, maker = _OF_THE_NET[name]
+        return question, maker(net, fired)
+    if not name.startswith("property."):
+        return None
+    of = next(of for of in net.properties if f"property.{of.name}" == name)
+    if isinstance(of, TemporalProperty):
+        goal = as_goal(of.formula)
+        return None if goal is None else (temporal_question(of), (_goal(*goal),))
+    goals = _property(of)
+    return None if goals is None else (Question(name, statement(of)), goals)
 
 
 def query_goals(queries: Iterable[Query], verdict: Verdict) -> tuple[Question, tuple[Goal, ...]] | None:
@@ -89,6 +97,10 @@ def query_goals(queries: Iterable[Query], verdict: Verdict) -> tuple[Question, t
 
 def _goal(formula: Formula, wanted: bool) -> Goal:
     return Goal(formula, lambda _: ((), f"here ({format_formula(formula)}) holds"), wanted)
+
+
+def _firing(transition: str) -> Goal:
+    return Goal(Firable(transition), lambda _: ((), ""), wanted=True, subjects=(transition,))
 
 
 def _never(bad: Formula, told: Callable[[Marking], Told]) -> tuple[Goal, ...]:
