@@ -3,8 +3,8 @@
 //! It explores the reachability graph of a 1-safe net with gates, under interleaving or synchronous steps, and answers
 //! what needs the whole graph; it holds markings in decision diagrams, and searches by stubborn sets, for lassos of LTL,
 //! for CTL as far as a marking needs, and without a graph (`compact`). It is the fast copy of the firing rule in
-//! `firable.semantics` and is held to it by differential tests, never trusted by itself. All files are plain Rust without `unsafe`, but for what the macros of
-//! the binding in `python/` write, and one instruction in `ahead.rs`.
+//! `firable.semantics` and is held to it by differential tests, never trusted by itself. All files are plain Rust
+//! without `unsafe`, but for what the macros of the binding in `python/` write, and one instruction in `ahead.rs`.
 //!
 //! Nobody can conclude from a part: a method whose answer needs the whole graph raises on an incomplete one.
 

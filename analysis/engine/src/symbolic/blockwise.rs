@@ -149,18 +149,28 @@ impl Symbolic {
 
     /// The markings that lead into the targets of a leg by the events below its block.
     fn layer(&mut self, roots: &[Node], leg: Leg, watch: &mut Watch<'_>) -> Result<Node, Stop> {
-        let low = self.blocks().low(leg.block);
         let mut values: Vec<Value> = Vec::new();
-        opened(self.store(), leg.targets, low, 0, &mut values)?;
+        let node = self.layer_of(roots, leg, &mut values, watch);
+        self.store().memory.drop_vec(values);
+        node
+    }
+
+    fn layer_of(
+        &mut self,
+        roots: &[Node],
+        leg: Leg,
+        values: &mut Vec<Value>,
+        watch: &mut Watch<'_>,
+    ) -> Result<Node, Stop> {
+        let low = self.blocks().low(leg.block);
+        opened(self.store(), leg.targets, low, 0, values)?;
         for at in 0..values.len() {
             let within = self.blocks().child(self.store(), leg.within, leg.block, values[at].bits);
             let held: Vec<Node> = values.iter().map(|value| value.node).chain(roots.iter().copied()).collect();
             let below = Leg { targets: values[at].node, within, block: leg.block - 1 };
             values[at].node = self.leading(&held, below, watch)?;
         }
-        let node = closed(&mut self.diagram().store, &values, low, leg.targets);
-        self.store().memory.drop_vec(values);
-        node
+        closed(&mut self.diagram().store, values, low, leg.targets)
     }
 
     /// Whether a set of what lies up to a block holds a marking.
