@@ -1,81 +1,37 @@
-"""Running decompositions on the simulated cell: workpieces, situations, the operator's controls."""
+"""Running decompositions on the simulated cell: workpieces, situations, how runs end."""
 
 import asyncio
-import io
 import random
-from collections.abc import Iterable
 from dataclasses import replace
-from pathlib import Path
 from typing import cast
 
 import pytest
+from support.cell_runs import replace_text, run_cell
 from support.cells import decomposition_of, firings, plant_of
 from support.owned_nets import owned_net
 
 from firable.decompose.splitting.cut import split
-from firable.executor.cell.disturbances import Disturbance, NeverCompletes, StuckSensor
+from firable.executor.cell.disturbances import StuckSensor
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.bench import until
 from firable.executor.drivers.dry_run import DryRunDriver
-from firable.executor.drivers.simulated import SimulatedDriver
 from firable.executor.operating.host import Host
 from firable.executor.operating.items import Item
 from firable.executor.operating.recorder import Recorder
-from firable.executor.operating.restart import uncertain
-from firable.executor.operating.running import Operator, RunReport, execute
+from firable.executor.operating.running import execute
 from firable.executor.operating.situation import State, is_deadlock
-from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.messages import ProtocolError
 from firable.executor.protocol.token_player import TokenPlayer
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.decomposition import Decomposition
-from firable.nets.machines.plant_file import PlantModel, parse_plant
+from firable.nets.machines.plant_file import parse_plant
 from firable.nets.net import Controller, ExternalGate, Net, Place, Signal, Transition
 from firable.nets.text import parse_net
-from firable.semantics.joining import VOTED
 from firable.semantics.judgement import Judgement, judge
 from firable.semantics.player import Player
-from firable.semantics.replaying import replay
-from firable.semantics.trace import CommandSent, Fired, Noted, Trace, parse_trace
+from firable.semantics.trace import Fired, Noted
 
 CELLS = ["one_robot", "one_robot_mc_late_capacity", "two_robots_shared", "two_robots_separate"]
-
-
-def run_cell(
-    cell: str,
-    workpieces: int,
-    *,
-    seed: int = 0,
-    speed: float | None = None,
-    overdue_seconds: float = 120.0,
-    disturbances: Iterable[Disturbance] = (),
-    operator: Operator | None = None,
-    plant: PlantModel | None = None,
-) -> tuple[RunReport, Trace]:
-    """Run a cell of the catalogue; every trace must be a complete one of the central net."""
-    stream = io.StringIO()
-    report = execute(
-        decomposition_of(cell),
-        plant or plant_of(cell),
-        workpieces=workpieces,
-        seed=seed,
-        speed=speed,
-        trace=stream,
-        overdue_seconds=overdue_seconds,
-        disturbances=disturbances,
-        operator=operator,
-    )
-    trace = parse_trace(stream.getvalue())
-    replayed = replay(catalogue_net(cell), trace)
-    assert replayed.complete
-    assert catalogue_net(cell).names(replayed.marking) == report.situation.marking
-    assert (replayed.firings, replayed.commands) == (sum(report.firings.values()), report.commands)
-    return report, trace
-
-
-def notes(trace: Trace) -> list[str]:
-    """What the trace keeps beside firings, signals, commands and votes."""
-    return [event.note for event in trace.events if isinstance(event, Noted) and event.note != VOTED]
 
 
 def test_a_hundred_workpieces_go_through_none_lost_none_doubled_in_order() -> None:
@@ -130,80 +86,10 @@ def test_robot_that_does_not_wait_crashes_into_the_full_machine() -> None:
     ]
 
 
-def replace_text(cell: str, old: str, new: str) -> PlantModel:
-    text = catalogue_path(cell).with_name(f"{cell}.plant.yaml").read_text("utf-8")
-    assert old in text
-    return parse_plant(text.replace(old, new))
-
-
-def test_command_that_never_completes_is_a_fault_and_not_a_deadlock() -> None:
-    report, _ = run_cell("one_robot", 5, disturbances=[NeverCompletes("MC", "CLAMP", 2)], overdue_seconds=60.0)
-    assert report.state is State.FAULT
-    assert report.situation.message.startswith("'MC CLAMP' of 'mc.fix', sent at ")
-    assert "is overdue: it counts as taken, and 'mc.clamped' has not come within 60 s" in report.situation.message
-    assert {gate for blocked in report.situation.blocked for gate in blocked.gates} >= {("mc.clamped", True)}
-    assert len(report.delivered) == 1
-
-
-JAMMED = """
-firable: 1
-cell: jammed
-controllers:
-  r:
-    start: [free, stuck]
-    places: {free: , stuck: , moves: {send: {machine: M, command: GO}, until: moved, within: {time: 5s, to: stuck}}}
-transitions:
-  go: {from: r.free, to: r.moves}
-  come: {from: r.moves, to: r.free}
-"""
-MOVER = """
-firable_plant: 1
-plant: jammed
-stations: [s]
-arrivals: {station: s, every_s: 8}
-departures: {station: s, after_s: 1}
-machines:
-  M: {commands: {GO: {does: work, takes_s: 1}}}
-"""
-
-
-@pytest.mark.parametrize("paused_seconds", [0.0, 300.0])
-def test_a_timed_command_is_overdue_where_its_timeout_cannot_fire_but_not_in_a_pause(paused_seconds: float) -> None:
-    seen: list[State] = []
-
-    async def pausing(host: Host) -> None:
-        while "r.moves" not in host.marking:
-            await asyncio.sleep(0.05)
-        if paused_seconds:
-            assert host.pause()
-            await asyncio.sleep(paused_seconds)
-            seen.append(host.situation().state)
-            assert host.resume()
-        await asyncio.sleep(1000.0)
-
-    report = execute(
-        split(parse_net(JAMMED)),
-        parse_plant(MOVER),
-        workpieces=1,
-        overdue_seconds=60.0,
-        disturbances=[NeverCompletes("M", "GO", 1)],
-        operator=pausing,
-    )
-    assert seen == ([State.PAUSED] if paused_seconds else [])
-    assert report.state is State.FAULT
-    assert "is overdue: it counts as taken" in report.situation.message
-    assert report.situation.message.endswith("'r.moved' has not come within its 5 s, nor its timeout in 60 s more")
-
-
 def test_completion_is_formed_where_its_sensor_drops_at_the_same_instant() -> None:
     # So it is, too, where a slow host learns at one time of all that has happened in the meantime.
     report, _ = run_cell("one_robot", 3, plant=replace_text("one_robot", "after_s: 1", "after_s: 0"))
     assert report.state is State.DONE
-
-
-def test_slow_command_is_no_fault_within_its_limit() -> None:
-    slow = replace_text("one_robot", "takes_s: 12.0", "takes_s: 110")
-    assert run_cell("one_robot", 2, plant=slow)[0].state is State.DONE
 
 
 def test_stuck_sensor_leaves_the_cell_waiting_for_its_gate() -> None:
@@ -217,227 +103,10 @@ def test_stuck_sensor_leaves_the_cell_waiting_for_its_gate() -> None:
     assert report.lost == ()
 
 
-def test_stuck_sensor_of_a_completion_makes_the_command_overdue() -> None:
-    report, _ = run_cell("one_robot", 5, disturbances=[StuckSensor("robot.touch", value=False)])
-    assert report.state is State.FAULT
-    assert "'robot.touch' has not come" in report.situation.message
-
-
 def test_sensor_stuck_at_one_makes_the_cell_act_on_nothing_which_the_plant_tells() -> None:
     report, _ = run_cell("one_robot", 2, disturbances=[StuckSensor("conveyor.part_at_entry", value=True)])
     assert report.state is State.FAULT
     assert "CV1 is to carry from cv1_entry, where no workpiece lies" in report.situation.message
-
-
-def test_nothing_fires_during_a_pause_and_everything_goes_on_after_it() -> None:
-    async def operator(host: Host) -> None:
-        await asyncio.sleep(33.3)
-        host.pause()
-        await host.quiet()
-        before = firings(host)
-        await asyncio.sleep(100.0)
-        assert firings(host) == before > 0
-        assert host.situation().state is State.PAUSED
-        host.resume()
-
-    report, trace = run_cell("one_robot", 5, operator=operator, overdue_seconds=1000.0)
-    assert report.state is State.DONE
-    assert report.delivered == (1, 2, 3, 4, 5)
-    assert notes(trace) == ["paused", "resumed"]
-    times = [event.at_seconds for event in trace.events if isinstance(event, Fired)]
-    assert not [at for at in times if 33.3 < at < 133.3]
-
-
-def test_single_step_fires_one_transition_at_a_time() -> None:
-    stepped: list[str] = []
-
-    async def operator(host: Host) -> None:
-        host.pause()
-        for _ in range(1000):
-            if len(stepped) == 15:
-                break
-            before = firings(host)
-            name = await host.step()
-            if name is None:
-                assert firings(host) == before
-                await asyncio.sleep(0.5)
-            else:
-                assert firings(host) == before + 1
-                stepped.append(name)
-        host.resume()
-
-    report, trace = run_cell("one_robot", 3, operator=operator)
-    assert report.state is State.DONE
-    assert [event.transitions[0] for event in trace.events if isinstance(event, Fired)][:15] == stepped
-    assert {"G1", "G2", "G3", "t1-a"} <= set(stepped)
-
-
-@pytest.mark.parametrize(
-    ("disturbance", "state"),
-    [
-        (StuckSensor("conveyor.part_at_entry", value=False), State.WAITING),
-        (NeverCompletes("MC", "CLAMP"), State.FAULT),
-    ],
-)
-def test_cell_is_at_rest_when_nothing_is_pending_and_not_while_a_completion_is_awaited(
-    disturbance: Disturbance, state: State
-) -> None:
-    async def operator(host: Host) -> None:
-        host.pause()
-        for _ in range(1000):
-            if await host.step() is None and host.at_rest:
-                break
-            await asyncio.sleep(0.5)
-        assert host.at_rest
-        assert not host.dispatch.timers
-        host.resume()
-
-    report, _ = run_cell("one_robot", 1, operator=operator, disturbances=[disturbance])
-    assert report.state is state
-
-
-def test_paused_run_does_not_end_while_the_operator_holds_firings_back() -> None:
-    async def operator(host: Host) -> None:
-        await until(lambda: firings(host) == 14, "all but one")
-        host.pause()
-        host.stop(at_end_of_cycle=True)
-        await asyncio.sleep(100.0)
-        assert host.at_rest
-        host.resume()
-
-    report, _ = run_cell("one_robot", 1, operator=operator, overdue_seconds=1000.0)
-    assert sum(report.firings.values()) == 15
-    assert report.situation.marking == catalogue_net("one_robot").names(catalogue_net("one_robot").initial_marking)
-
-
-def test_step_is_for_a_paused_run() -> None:
-    async def operator(host: Host) -> None:
-        assert await host.step() is None
-
-    assert run_cell("one_robot", 1, operator=operator)[0].state is State.DONE
-
-
-def test_after_a_stop_nothing_fires_and_every_machine_stands_still() -> None:
-    kept: list[Host] = []
-
-    async def operator(host: Host) -> None:
-        kept.append(host)
-        await asyncio.sleep(41.0)
-        host.stop()
-        host.resume()  # a stop is final
-
-    report, trace = run_cell("one_robot", 50, operator=operator)
-    assert report.state is State.STOPPED
-    assert report.simulated_seconds == pytest.approx(41.0)
-    assert report.inside
-    stopped = next(
-        i for i, e in enumerate(trace.events) if isinstance(e, Noted) and e.note == "stopped by the operator"
-    )
-    assert not [event for event in trace.events[stopped:] if isinstance(event, Fired | CommandSent)]
-    driver = kept[0].driver
-    assert isinstance(driver, SimulatedDriver)
-    assert all(machine.busy is None for machine in driver.plant.machines.values())
-
-
-def test_a_trace_that_breaks_while_a_command_is_overdue_ends_the_run() -> None:
-    class Full(io.StringIO):
-        def write(self, line: str) -> int:
-            if "overdue" in line:
-                raise OSError("no space left")
-            return super().write(line)
-
-    never = NeverCompletes("R", "GRASP", 1)
-    with pytest.raises(OSError, match="no space left"):
-        execute(decomposition_of("one_robot"), plant_of("one_robot"), workpieces=1, trace=Full(), disturbances=[never])
-
-
-def test_stop_at_the_end_of_the_cycle_leaves_an_empty_cell() -> None:
-    async def operator(host: Host) -> None:
-        await asyncio.sleep(60.0)
-        host.stop(at_end_of_cycle=True)
-
-    report, _ = run_cell("one_robot", 50, operator=operator)
-    assert report.state is State.STOPPED
-    assert report.inside == ()
-    assert report.delivered == tuple(range(1, len(report.delivered) + 1))
-    assert 1 < len(report.delivered) < 50
-
-
-async def reset_and_resume(host: Host) -> None:
-    """After an emergency stop, where what the machines were at is to be done anew; stop a run that does not end."""
-    assert host.reset() == ()
-    await asyncio.sleep(1.0)
-    for place in uncertain(host):
-        assert host.say(place, Answer.NOT_RECEIVED)
-    assert host.resume()
-    await asyncio.sleep(1000.0)
-    host.stop()
-
-
-def test_work_comes_in_again_after_an_emergency_stop_in_the_last_cycle() -> None:
-    async def operator(host: Host) -> None:
-        await asyncio.sleep(60.0)
-        host.stop(at_end_of_cycle=True)
-        await asyncio.sleep(1.0)
-        host.emergency_stop("a person")
-        await until(lambda: host.situation().state is State.LATCHED, "the latch")
-        await reset_and_resume(host)
-
-    report, _ = run_cell("one_robot", 6, operator=operator)
-    assert (report.state, report.delivered) == (State.DONE, tuple(range(1, 7)))
-
-
-def test_a_run_that_was_stopped_at_the_end_of_its_cycle_is_taken_up_with_the_work_that_is_to_come(
-    tmp_path: Path,
-) -> None:
-    async def operator(host: Host) -> None:
-        await asyncio.sleep(60.0)
-        host.stop(at_end_of_cycle=True)
-
-    def run_on(operator: Operator | None) -> RunReport:
-        cell, plant = decomposition_of("one_robot"), plant_of("one_robot")
-        return execute(
-            cell, plant, workpieces=6, operator=operator, journal_path=tmp_path / "cell.journal", resume=True
-        )
-
-    stopped = run_on(operator)
-    assert stopped.state is State.STOPPED
-    assert len(stopped.delivered) < 6
-    for _ in range(2):  # the second one finds nothing to do
-        report = run_on(None)
-        assert (report.state, report.delivered) == (State.DONE, tuple(range(1, 7)))
-
-
-def test_what_was_due_while_a_run_was_latched_happens_when_it_is_reset() -> None:
-    async def operator(host: Host) -> None:
-        await asyncio.sleep(100.0)  # the first workpiece has left, and the second has not come
-        host.emergency_stop("a person")
-        await asyncio.sleep(200.0)
-        await reset_and_resume(host)
-
-    text = catalogue_path("one_robot").with_name("one_robot.plant.yaml").read_text()
-    report, _ = run_cell(
-        "one_robot", 2, operator=operator, plant=parse_plant(text.replace("every_s: 8", "every_s: 200"))
-    )
-    assert (report.state, report.delivered) == (State.DONE, (1, 2))
-
-
-def test_cancelled_run_is_an_operators_stop() -> None:
-    async def cancelled(host: Host) -> None:
-        await asyncio.sleep(20.0)
-        (main,) = (task for task in asyncio.all_tasks() if "terminable" in repr(task.get_coro()))
-        main.cancel()
-
-    report, _ = run_cell("one_robot", 5, operator=cancelled)
-    assert report.state is State.STOPPED
-
-
-def test_operators_mistake_ends_the_run() -> None:
-    async def operator(host: Host) -> None:
-        raise ZeroDivisionError
-
-    with pytest.raises(ZeroDivisionError):
-        run_cell("one_robot", 5, operator=operator)
 
 
 @pytest.mark.parametrize(("mailbox", "receiver"), [("", "the coordinator"), ("robot", "'robot'")])
