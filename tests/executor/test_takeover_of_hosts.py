@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import closing, nullcontext
 from pathlib import Path
 
@@ -209,53 +209,46 @@ def test_a_host_of_which_the_new_net_has_nothing_has_no_journal(
     assert not (tmp_path / "spare.new").exists()
 
 
-class Breaking:
-    """Writes so many files whole, and is interrupted at the next."""
+def breaking(left: int) -> Callable[[Path | str, bytes | str], None]:
+    """What writes so many files whole, and is interrupted at the next."""
+    written: list[Path | str] = []
 
-    left = 0
-
-    def __call__(self, path: Path | str, data: bytes | str) -> None:
-        if self.left == 0:
+    def write(path: Path | str, data: bytes | str) -> None:
+        if len(written) == left:
             raise KeyboardInterrupt
-        self.left -= 1
+        written.append(path)
         write_whole(path, data)
 
+    return write
 
+
+@pytest.mark.parametrize("at", range(6))
 def test_a_takeover_that_breaks_off_leaves_no_journal_that_begins_anew(
-    bundles: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    bundles: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at: int
 ) -> None:
-    monkeypatch.setattr("firable.nets.writing.write_whole", breaking := Breaking())
-    for at in range(6):
-        folder = tmp_path / str(at)
-        folder.mkdir()
-        breaking.left = at
-        assert main(["takeover", *map(str, bundles), *hosts(bundles, folder)]) == 3
-        capsys.readouterr()
-        for name, machines in HOSTS_OF_OLD.items():
-            new = folder / f"{name}.new"
-            if new.exists():
-                with closing(SqliteJournal(new, read_bundle(bundles[1]).digest, machines)) as opened:
-                    assert all(opened.kept(machine) for machine in machines)
-            elif Path(f"{new}.generation").exists():
-                with pytest.raises(InputError, match="F5032"):
-                    SqliteJournal(new, read_bundle(bundles[1]).digest, machines)
+    monkeypatch.setattr("firable.nets.writing.write_whole", breaking(at))
+    assert main(["takeover", *map(str, bundles), *hosts(bundles, tmp_path)]) == 3
+    for name, machines in HOSTS_OF_OLD.items():
+        new = tmp_path / f"{name}.new"
+        if new.exists():
+            with closing(SqliteJournal(new, read_bundle(bundles[1]).digest, machines)) as opened:
+                assert all(opened.kept(machine) for machine in machines)
+        elif Path(f"{new}.generation").exists():
+            with pytest.raises(InputError, match="F5032"):
+                SqliteJournal(new, read_bundle(bundles[1]).digest, machines)
 
 
+@pytest.mark.parametrize("at", range(6))
 def test_a_takeover_that_is_killed_lets_no_host_begin_anew_beside_one_that_goes_on(
-    bundles: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    bundles: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at: int
 ) -> None:
     monkeypatch.setattr("firable.cli.takeover._removed_if_it_fails", lambda _: nullcontext())
-    monkeypatch.setattr("firable.nets.writing.write_whole", breaking := Breaking())
-    for at in range(6):
-        folder = tmp_path / str(at)
-        folder.mkdir()
-        breaking.left = at
-        assert main(["takeover", *map(str, bundles), *hosts(bundles, folder)]) == 3
-        capsys.readouterr()
-        journals = [folder / f"{name}.new" for name in HOSTS_OF_OLD]
-        goes_on = any(new.exists() for new in journals)
-        assert goes_on is (at > len(journals))
-        for new, machines in zip(journals, HOSTS_OF_OLD.values(), strict=True):
-            if goes_on and not new.exists():
-                with pytest.raises(InputError, match="F5032"):
-                    SqliteJournal(new, read_bundle(bundles[1]).digest, machines)
+    monkeypatch.setattr("firable.nets.writing.write_whole", breaking(at))
+    assert main(["takeover", *map(str, bundles), *hosts(bundles, tmp_path)]) == 3
+    journals = [tmp_path / f"{name}.new" for name in HOSTS_OF_OLD]
+    goes_on = any(new.exists() for new in journals)
+    assert goes_on is (at > len(journals))
+    for new, machines in zip(journals, HOSTS_OF_OLD.values(), strict=True):
+        if goes_on and not new.exists():
+            with pytest.raises(InputError, match="F5032"):
+                SqliteJournal(new, read_bundle(bundles[1]).digest, machines)
