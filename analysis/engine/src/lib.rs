@@ -50,6 +50,8 @@ mod pair;
 #[forbid(unsafe_code)]
 pub mod paths;
 #[forbid(unsafe_code)]
+mod random;
+#[forbid(unsafe_code)]
 pub mod region;
 #[cfg(test)]
 pub(crate) mod samples;

@@ -186,6 +186,26 @@ fn slice_word<W: Width>(width: W, k: usize, markings: &[u64], block: &mut [u64; 
     }
 }
 
+/// The numbers of the bits of a word.
+pub(crate) fn members(mut word: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let bit = (word != 0).then(|| word.trailing_zeros() as usize);
+        word &= word.wrapping_sub(1);
+        bit
+    })
+}
+
+/// The markings of slices, end to end.
+pub(crate) fn unslice(words: usize, slices: &[u64], markings: &mut [u64]) {
+    for (k, rows) in slices.as_chunks::<64>().0.iter().enumerate() {
+        let mut rows = *rows;
+        transpose(&mut rows);
+        for (marking, row) in markings.chunks_exact_mut(words).zip(rows) {
+            marking[k] = row;
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -20,7 +20,7 @@ use super::{Bottoms, meeting, ranking, top};
 use crate::batch::Batch;
 use crate::budget::{Memory, Stop, Watch};
 use crate::explore::Space;
-use crate::marking::{Width, transpose};
+use crate::marking::{Width, members, unslice};
 use crate::net::Net;
 
 /// Where more than one of so many markings is stuck, going down is not the way.
@@ -199,26 +199,6 @@ fn join<W: Width>(
         }
     }
     Ok(true)
-}
-
-/// The numbers of the bits of a word.
-pub(super) fn members(mut word: u64) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let bit = (word != 0).then(|| word.trailing_zeros() as usize);
-        word &= word.wrapping_sub(1);
-        bit
-    })
-}
-
-/// The markings of slices, end to end.
-pub(super) fn unslice(words: usize, slices: &[u64], markings: &mut [u64]) {
-    for (k, rows) in slices.as_chunks::<64>().0.iter().enumerate() {
-        let mut rows = *rows;
-        transpose(&mut rows);
-        for (marking, row) in markings.chunks_exact_mut(words).zip(rows) {
-            marking[k] = row;
-        }
-    }
 }
 
 /// What follows where nothing but M0 and deadlocks is left.

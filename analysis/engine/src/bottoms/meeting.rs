@@ -11,11 +11,10 @@
 
 use std::collections::HashSet;
 
-use super::descent::{members, unslice};
 use crate::batch::Batch;
 use crate::budget::{Memory, Stop, Watch};
 use crate::explore::Space;
-use crate::marking::{Width, holds, mix};
+use crate::marking::{Width, holds, members, mix, unslice};
 
 /// Passes over all transitions between two looks at where strolls have come to.
 const PASSES: usize = 4;

@@ -16,10 +16,10 @@ use super::product::Product;
 use super::shortest::Lasso;
 use crate::budget::{Found, Memory, Stop, Watch};
 use crate::marking::Width;
+use crate::random::Random;
 use crate::stubborn::dependencies::negation;
 use crate::stubborn::marks::Marks;
 use crate::stubborn::search::Prepared;
-use crate::stubborn::walk::Random;
 use crate::table::NONE;
 use crate::with_width;
 

@@ -27,6 +27,15 @@ pub enum Node {
     EachUntil(u32, u32),
 }
 
+/// A subformula that is an until, of some run or of each.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Until {
+    pub(super) node: u32,
+    pub(super) left: u32,
+    pub(super) right: u32,
+    pub(super) some: bool,
+}
+
 impl Node {
     fn operands(&self) -> Vec<u32> {
         match self {

@@ -9,13 +9,12 @@
 
 use std::time::{Duration, Instant};
 
-use super::formula::{Formula, Node};
-use super::until::Until;
+use super::formula::{Formula, Node, Until};
 use crate::budget::{Found, Memory, Stop, Watch};
 use crate::marking::{Width, linear_hash};
+use crate::random::Random;
 use crate::stubborn::marks::Marks;
 use crate::stubborn::search::Prepared;
-use crate::stubborn::walk::Random;
 use crate::table::{NONE, Table};
 use crate::with_width;
 

@@ -4,6 +4,7 @@
 //! settled the first time it is met. Which firing is tried first is a round's to say. What is firable at a marking follows
 //! from what was firable before the firing that led there; these lists lie on a stack, as long as the way.
 
+use super::formula::Until;
 use super::search::{Local, MET, OUTERMOST, Truth, known};
 use crate::budget::{Found, Stop, Watch};
 use crate::marking::Width;
@@ -24,15 +25,6 @@ struct Frame {
 struct Root {
     met: u32,
     open: bool,
-}
-
-/// A subformula that is an until, of some run or of each.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Until {
-    pub(super) node: u32,
-    pub(super) left: u32,
-    pub(super) right: u32,
-    pub(super) some: bool,
 }
 
 /// What a search has on its way.

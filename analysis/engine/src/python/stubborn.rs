@@ -13,7 +13,8 @@ use crate::stubborn::cover;
 use crate::stubborn::dependencies::literal;
 use crate::stubborn::formula::{Formula, Node};
 use crate::stubborn::search::{self, Goal, Limits, Prepared};
-use crate::stubborn::walk::{self, Target};
+use crate::stubborn::walk;
+use crate::stubborn::walker::Target;
 use crate::table::NONE;
 
 /// A formula from Python: (operator, operands), 0 empty, 1 full, 2 all, 3 any.

@@ -12,9 +12,11 @@
 use super::dependencies::{Dependencies, negation};
 use super::marks::Marks;
 use super::relaxed::Plan;
-use super::walk::{DRAWS, LENGTH_MAX, Random, Target, UNIT, Walker, cut_down, luby, without_loops};
+use super::walk::{DRAWS, LENGTH_MAX, UNIT, cut_down, luby, without_loops};
+use super::walker::{Target, Walker};
 use crate::budget::{Stop, Watch};
 use crate::net::Net;
+use crate::random::Random;
 
 /// A moment: so many firings of a way.
 type Moment = (u32, u32);

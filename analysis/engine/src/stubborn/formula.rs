@@ -5,7 +5,7 @@
 //! disjunction. Nothing here knows of transitions: firable, deadlock and start come as the formulas that they are.
 
 use super::dependencies::{Literal, is_true};
-use super::walk::Random;
+use crate::random::Random;
 
 /// A node of a formula; operands are indexes of earlier nodes.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -57,3 +57,4 @@ pub mod marks;
 pub mod relaxed;
 pub mod search;
 pub mod walk;
+pub mod walker;

@@ -14,7 +14,8 @@
 use super::dependencies::{Dependencies, Literal, is_true, negation};
 use super::formula::Formula;
 use super::marks::Marks;
-use super::walk::{Random, Target, Walker};
+use super::walker::{Target, Walker};
+use crate::random::Random;
 
 /// Firings along one relaxed plan before the next is made.
 const PLAN_STEPS: usize = 64;

@@ -217,7 +217,7 @@ mod tests {
 
     /// The firings into a set, each of which may fire where it stands.
     fn way(space: &mut Symbolic, targets: Node) -> Vec<u32> {
-        let (moves, mut poll) = (Moves::of(space), unwatched);
+        let (moves, mut poll) = (space.moves(), unwatched);
         let watch = &mut Watch::new(None, &mut poll);
         let (mut marking, mut end) = (space.first(), space.first());
         let firings = space.block_by_block(&[targets], targets, &mut end, &moves, watch).expect("enough room");
@@ -244,7 +244,7 @@ mod tests {
     /// How many firings there are on the ways to all markings, and how many on the shortest.
     fn lengths(net: Net) -> (usize, usize) {
         let mut space = explored(&net);
-        let (graph, moves, mut poll) = (explore(net, false), Moves::of(&space), unwatched);
+        let (graph, moves, mut poll) = (explore(net, false), space.moves(), unwatched);
         let (mut found, mut least) = (0, 0);
         for at in 0..graph.len() {
             let target = space.single(&[], &marked(&graph.net, graph.marking(at))).expect("enough room");

@@ -31,7 +31,7 @@ use super::space::{By, Events, Symbolic};
 use super::walk::{Marking, Moves, holds, tokens};
 use super::zdd::{EMPTY, Node, TERMINAL};
 use crate::budget::{Stop, Watch};
-use crate::stubborn::walk::Random;
+use crate::random::Random;
 
 /// Results of the diagram's that the rounds take before a short cut is tried.
 const PLAIN: u64 = 1 << 16;
@@ -181,7 +181,7 @@ struct Hunt {
 
 impl Hunt {
     fn new(space: &Symbolic) -> Self {
-        Hunt { moves: Moves::of(space), random: Random::new(1), work: 0 }
+        Hunt { moves: space.moves(), random: Random::new(1), work: 0 }
     }
 
     /// A marking of a set, and firings that come round to it inside the set; None where the search does not come round.

@@ -14,7 +14,7 @@ use super::ordered::Ordered;
 use super::passing::passing;
 pub use super::saturation::By;
 use super::saturation::{Saturation, Workshop};
-use super::walk::{LAYERS_WORK, Walk};
+use super::walk::Walks;
 use super::zdd::{EMPTY, Node, Store};
 use crate::budget::{Stop, Watch};
 use crate::net::Transition;
@@ -35,10 +35,8 @@ pub struct Symbolic {
     pub fired: u64,
     /// How many nodes were in use when the search ended, dead ones included.
     pub nodes: usize,
-    /// What the next search for a firing sequence may spend on layers.
-    pub(super) layers_work: u64,
-    /// The firing sequences that took a search of their own.
-    pub(super) walks: Vec<Walk>,
+    /// What is remembered of the firing sequences found.
+    pub(super) walks: Walks,
 }
 
 impl Symbolic {
@@ -64,17 +62,7 @@ impl Symbolic {
         reach: Node,
         (fired, nodes): (u64, usize),
     ) -> Self {
-        Symbolic {
-            transitions,
-            ordered,
-            reach,
-            start,
-            initial,
-            fired,
-            nodes,
-            layers_work: LAYERS_WORK,
-            walks: Vec::new(),
-        }
+        Symbolic { transitions, ordered, reach, start, initial, fired, nodes, walks: Walks::default() }
     }
 
     /// Nodes and results.

@@ -7,7 +7,7 @@
 use super::merging::Merged;
 use crate::budget::{Stop, Watch};
 use crate::net::Transition;
-use crate::stubborn::walk::Random;
+use crate::random::Random;
 
 /// The runs, and how many transitions each tests for each transition of the net: much less than a diagram costs.
 const RUNS: u64 = 16;
