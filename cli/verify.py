@@ -147,7 +147,7 @@ def _report(file: str, asked: _Asked) -> Report:
         _refuse_another_net(file, document.net, asked.of)
     checked = list(check_document(document, timeout_ms=asked.timeout_ms))
     verdicts = [_verdict(document, one) for one in checked]
-    claims = [_claim(one) for one in checked]
+    claims = [_claim(document, one) for one in checked]
     files = asked.write(file, dict(_obligations(document, asked.timeout_ms))) if asked.smt_dir is not None else ()
     discipline = document.discipline.value
     return Report("verify", file, document.net, tuple(verdicts), discipline=discipline, files=files, claims=claims)
@@ -171,14 +171,20 @@ def _verdict(document: Document, checked: CheckedRecord) -> Verdict:
     )
 
 
-def _claim(checked: CheckedRecord) -> Verdict:
-    """The verdict that a record claims, with the weight of its name; what nobody knows by its name must hold."""
+def _claim(document: Document, checked: CheckedRecord) -> Verdict:
+    """The verdict that a record claims, with the weight of its name; what nobody knows by its name must hold.
+
+    For information alone are claims without a name, as those of votes, and what is asked of the dead, who may hold up
+    anything.
+    """
+    from firable.decompose.verification.bereft import DEAD
     from firable.decompose.verification.words import SENTENCES
     from firable.nets.verdict import Status, Verdict, Weight
 
     record = checked.record
     sentence, weights = SENTENCES.get(record.name, ("", {Weight.REQUIRED}))
-    weight = next(one for one in Weight if one in weights)
+    told_alone = not record.name or DEAD in document.net.place_index
+    weight = Weight.INFORMATION if told_alone else next(one for one in Weight if one in weights)
     status = Status.PROVED if record.proved else Status.VIOLATED
     return Verdict(record.name, status, f"{_claimed(record) or sentence}{_of(record)}", "claimed", weight)
 

@@ -24,6 +24,7 @@ from functools import cached_property
 from itertools import combinations
 from typing import Final
 
+from firable.analysis.deadline import NEVER
 from firable.analysis.goal import Limits
 from firable.analysis.spaces.reachability import Budget, explore
 from firable.analysis.spaces.space import Witnesses
@@ -133,7 +134,7 @@ class Search:
         places = self.protocol.net.places
         net = Net("focus", places, (*steps, *(leap.transition for leap in leaps.values())))
         budget = Budget(MARKINGS_MAX, self.limits.memory_bytes)
-        graph = explore(net, budget=budget, deadline=self.limits.deadline)
+        graph = explore(net, budget=budget, deadline=self.limits.deadline).until(NEVER)
         found = graph.witness(graph.satisfying(self.goal))
         if found is None:
             return None

@@ -26,6 +26,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from firable.analysis.deadline import NEVER
 from firable.analysis.goal import Limits
 from firable.analysis.question import Answer, Question, listed, no, yes
 from firable.analysis.spaces.reachability import REASONS, Budget, BudgetExceeded, ReachabilityGraph, explore
@@ -149,7 +150,8 @@ class Exploration:
         if not isinstance(self.space, ReachabilityGraph):
             return ()
         protocol, net = self.protocol, self.protocol.parts.net
-        strange = self.space.satisfying(And((protocol.at_rest, Or((protocol.differs, Holds(ASTRAY))))))
+        known = self.space.until(NEVER)
+        strange = known.satisfying(And((protocol.at_rest, Or((protocol.differs, Holds(ASTRAY))))))
         own = [protocol.net.place_index[place.name] for place in net.places]
         shown: dict[int, None] = {}
         for i in np.flatnonzero(strange):

@@ -17,6 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Final
 
+from firable.analysis.deadline import NEVER
 from firable.analysis.goal import Limits
 from firable.analysis.spaces.reachability import Budget, BudgetExceeded, explore
 from firable.analysis.spaces.symbolic import explore_symbolically
@@ -135,6 +136,7 @@ def refute(wrong: WrongProtocol, net: Net | Decomposition | None = None, limits:
     limits = limits or Limits()
     protocol = protocol_net(decomposition, wrong.variant, wrong.faults)
     graph = explore(protocol.net, budget=Budget(FIRST_MARKINGS, limits.memory_bytes), deadline=limits.deadline)
+    graph = graph.until(NEVER)  # the markings that were found are looked at even if the time was over meanwhile
     witness = graph.witness(graph.satisfying(_goal(protocol)))
     if witness is not None and len(witness.firings) <= LINES_READ_AT_ONCE:
         return Refutation(wrong, protocol, Status.VIOLATED, graph.method, witness)

@@ -102,7 +102,7 @@ def _judge(
         _RUNS if "firings played" in method else method for one in checked for method in one.methods
     )
     how = f"the net that is left, made anew, and tied to the protocol: {'; '.join(methods)}"
-    examination.judge(verdict, shown=not late, method=how, only_claimed=late)
+    examination.judge(verdict, shown=not late and all(one.shown for one in checked), method=how, only_claimed=late)
 
 
 @dataclass

@@ -3,6 +3,7 @@
 import gzip
 import json
 import re
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from support.second_solver import by_cvc5
 from firable.analysis.evidence.certificate import FiringSequence, Labelling
 from firable.analysis.evidence.checking.obligation import Evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind
-from firable.analysis.evidence.document import Document, Record, seal
+from firable.analysis.evidence.document import Document, Record, read_document, seal
 from firable.analysis.evidence.producing.labels import listed
 from firable.analysis.goal import Limits
 from firable.analysis.induction.k_induction import decide_by_k_induction
@@ -194,6 +195,23 @@ def test_what_is_shown_to_be_violated_is_told_so_and_how_much_it_matters(
     )
     assert "1 marking and 0 firings gone through" in besides
     assert "20 shown (9 to be violated, 3 of which must hold)" in told
+
+
+def test_what_the_dead_hold_up_and_claims_of_no_verdict_are_told_besides(
+    invariant: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["prove", "catalogue:conceptual_one_robot", "--faults", "--smt-dir", str(tmp_path / "proof")]) == 0
+    unnamed = tmp_path / "unnamed.evidence.json"
+    of = read_document(invariant)
+    unnamed.write_text(replace(of, records=tuple(replace(record, name="") for record in of.records)).to_text())
+    dead = sorted((tmp_path / "proof").glob("faults.dead*.evidence.json"))
+    assert len(dead) == 4
+    for file in (*dead, unnamed):
+        capsys.readouterr()
+        assert main(["verify", str(file)]) == 0
+        told = capsys.readouterr().out
+        assert "\ntold besides\n" in told
+        assert "must hold" not in told
 
 
 def test_a_verdict_that_nothing_shows_is_only_claimed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

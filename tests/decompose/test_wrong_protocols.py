@@ -1,9 +1,15 @@
 """Every protocol that is known to be wrong is refuted, by a run that can be read."""
 
+from threading import Event
+from typing import Any
+
 import pytest
 from support.reference import load_net
 
+from firable.analysis.deadline import Deadline
 from firable.analysis.goal import Limits
+from firable.analysis.spaces.reachability import ReachabilityGraph, explore
+from firable.decompose.protocol import refuting
 from firable.decompose.protocol.building import protocol_net
 from firable.decompose.protocol.directed import Search, directed, numbered
 from firable.decompose.protocol.draft import ASTRAY
@@ -220,3 +226,17 @@ def test_a_net_without_free_parts_cannot_go_wrong_by_them(name: str) -> None:
     net = example("doors")
     assert freed(split(net)).free == ()
     assert refute(BY_NAME[name], split(net)).status is Status.PROVED
+
+
+def test_time_that_ends_while_the_first_markings_are_found_leaves_it_undecided(monkeypatch: pytest.MonkeyPatch) -> None:
+    over = Event()
+
+    def explored(*of: Any, **how: Any) -> ReachabilityGraph:
+        graph = explore(*of, **how)
+        over.set()
+        return graph
+
+    monkeypatch.setattr(refuting, "explore", explored)
+    found = refute(BY_NAME["unlocked-conflicts"], catalogue_net("two_cells"), Limits(Deadline(cancelled=over)))
+    assert (found.status, found.witness) == (Status.UNKNOWN, None)
+    assert found.verdict.bound
