@@ -9,12 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
 from typing import Final
 
-from firable.nets.net import Arbiter, Net, Place
+from firable.nets.net import Arbiter, Net, Place, Transition
 
 _CAPACITY: Final = "capacity"
+
+
+@dataclass(frozen=True, slots=True)
+class _Draft:
+    """What of a net changes, while it is no net yet: a change for each conflict of a large net makes one net."""
+
+    places: list[Place]
+    transitions: dict[str, Transition]
+    arbiters: list[Arbiter]
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,19 +35,14 @@ class Gate:
 
     size = 1
 
-    def made(self, net: Net) -> Net:
-        """The net with the gate."""
-
-        def gated(of: str) -> tuple[str, ...]:
-            return (*getattr(net.transition(self.transition), of), self.place)
-
-        old = net.transition(self.transition)
-        new = (
-            replace(old, permissive=gated("permissive"))
+    def make(self, draft: _Draft) -> None:
+        """Add the gate."""
+        old = draft.transitions[self.transition]
+        draft.transitions[self.transition] = (
+            replace(old, permissive=(*old.permissive, self.place))
             if self.permissive
-            else replace(old, inhibitive=gated("inhibitive"))
+            else replace(old, inhibitive=(*old.inhibitive, self.place))
         )
-        return replace(net, transitions=tuple(new if one is old else one for one in net.transitions))
 
     def __str__(self) -> str:
         return f"give {self.transition} the gate `{'if' if self.permissive else 'unless'}: {self.place}`"
@@ -64,19 +67,15 @@ class CapacityPlace:
         """The place and its arcs."""
         return 1 + len(self.takers) + len(self.givers)
 
-    def made(self, net: Net) -> Net:
-        """The net with the place."""
-        place = Place(self.place, self.owner, marked=True, description=self.description)
-        takers, givers = set(self.takers), set(self.givers)
-        transitions = tuple(
-            replace(
-                one,
-                inputs=(*one.inputs, self.place) if one.name in takers else one.inputs,
-                outputs=(*one.outputs, self.place) if one.name in givers else one.outputs,
-            )
-            for one in net.transitions
-        )
-        return replace(net, places=(*net.places, place), transitions=transitions)
+    def make(self, draft: _Draft) -> None:
+        """Add the place."""
+        draft.places.append(Place(self.place, self.owner, marked=True, description=self.description))
+        for name in self.takers:
+            taker = draft.transitions[name]
+            draft.transitions[name] = replace(taker, inputs=(*taker.inputs, self.place))
+        for name in self.givers:
+            giver = draft.transitions[name]
+            draft.transitions[name] = replace(giver, outputs=(*giver.outputs, self.place))
 
     def __str__(self) -> str:
         return (
@@ -96,9 +95,9 @@ class Arbitration:
         """How many transitions it names."""
         return len(self.arbiter.among)
 
-    def made(self, net: Net) -> Net:
-        """The net with the arbiter."""
-        return replace(net, arbiters=(*net.arbiters, self.arbiter))
+    def make(self, draft: _Draft) -> None:
+        """Add the arbiter."""
+        draft.arbiters.append(self.arbiter)
 
     def __str__(self) -> str:
         among = ", ".join(self.arbiter.among)
@@ -110,7 +109,15 @@ Change = Gate | CapacityPlace | Arbitration
 
 def changed(net: Net, changes: Iterable[Change]) -> Net:
     """The net after all changes; raises `InputError` where that is no well-formed net."""
-    return reduce(lambda before, change: change.made(before), changes, net)
+    draft = _Draft([*net.places], {one.name: one for one in net.transitions}, [*net.arbiters])
+    for change in changes:
+        change.make(draft)
+    return replace(
+        net,
+        places=tuple(draft.places),
+        transitions=tuple(draft.transitions.values()),
+        arbiters=tuple(draft.arbiters),
+    )
 
 
 def capacity(net: Net, takers: Sequence[str], givers: Sequence[str]) -> CapacityPlace:

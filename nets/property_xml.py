@@ -68,14 +68,18 @@ _HINT: Final = "the property XML of the model checking contest is read, with not
 def parse_property_xml(data: bytes, net: Net, renamed: Mapping[str, str], file: str = "<xml>") -> tuple[Query, ...]:
     """The queries of a property XML file.
 
-    Raises `InputError`: F1018 where it is none, F1012 for a mixture of CTL and LTL, F2001 for two queries of one name,
-    F2002 and F2004 for unknown places and transitions.
+    Raises `InputError`: F1002 and F1018 where it is none, F1012 for a mixture of CTL and LTL, F2001 for two queries of
+    one name, F2002 and F2004 for unknown places and transitions.
     """
     source = Source(file, data.decode("utf-8-sig", "replace"))
     reading = _Reading(source, net, renamed)
     queries = tuple(reading.queries(parse_elements(source, data, "F1018")))
     if reading.problems:
         raise InputError(bounded(reading.problems))
+    if not queries:
+        raise source.refuse(
+            "F1002", "there is no query in the file", "a <property-set> has a <property> for each query"
+        )
     return tuple(_in_its_logic(queries, Path(file).name))
 
 

@@ -38,7 +38,7 @@ Turns = tuple[int, ...]
 """For each group, where in its sequence the next preference begins: all that arbitration remembers."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Group:
     """One conflict component and the rule that decides it, by the indexes of transitions."""
 
@@ -47,9 +47,25 @@ class Group:
     rest: tuple[int, ...]
     by: ArbitrationRule
 
-    def preference(self, turn: int) -> tuple[int, ...]:
-        """The members in order of preference, each once."""
-        return tuple(dict.fromkeys((*self.sequence[turn:], *self.sequence[:turn], *self.rest)))
+    def preference(self, members: Iterable[int], turn: int) -> list[int]:
+        """Some of the members in order of preference; the cost does not depend on how many others there are."""
+        length = len(self.sequence)
+
+        def rank(t: int) -> int:
+            places = self._places[t]
+            return places[0] if places[0] >= length else min((place - turn) % length for place in places)
+
+        return sorted(members, key=rank)
+
+    @cached_property
+    def _places(self) -> Mapping[int, tuple[int, ...]]:
+        """Where each member stands in the sequence, or behind all of it."""
+        places: dict[int, tuple[int, ...]] = {}
+        for at, t in enumerate(self.sequence):
+            places[t] = (*places.get(t, ()), at)
+        for at, t in enumerate(self.rest, start=len(self.sequence)):
+            places.setdefault(t, (at,))
+        return places
 
     def turn_after(self, winners: AbstractSet[int], losers: AbstractSet[int], turn: int) -> int:
         """The turn after these won and those lost an input conflict, all in one step."""
@@ -130,13 +146,6 @@ class Arbitration:
     def _group_of(self) -> Mapping[int, int]:
         return {t: g for g, group in enumerate(self.groups) for t in (*group.sequence, *group.rest)}
 
-    @cached_property
-    def _in_file_order(self) -> frozenset[int]:
-        """The groups without an arbiter: their order is known without going through all members."""
-        return frozenset(
-            g for g, group in enumerate(self.groups) if not group.sequence and list(group.rest) == sorted(group.rest)
-        )
-
     def decide(self, enabled: Iterable[int], turns: Turns) -> tuple[FiringSet, Turns]:
         """The granted transitions, a maximal set without conflict of the enabled ones, and the turns after it."""
         competing: dict[int, set[int]] = {}
@@ -148,13 +157,7 @@ class Arbitration:
                 competing.setdefault(g, set()).add(t)
         after = list(turns)
         for g, candidates in competing.items():
-            group = self.groups[g]
-            preference = (
-                sorted(candidates)
-                if g in self._in_file_order
-                else [t for t in group.preference(turns[g]) if t in candidates]
-            )
-            won = self.conflicts.maximal(preference)
+            won = self.conflicts.maximal(self.groups[g].preference(candidates, turns[g]))
             after[g] = self.turn_after(g, won, candidates, turns[g])
             granted |= won
         return tuple(sorted(granted)), tuple(after)

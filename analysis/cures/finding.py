@@ -28,14 +28,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, islice, product
+from itertools import combinations, islice, product, takewhile
 from typing import Any, Final, Generic
 
 from firable.analysis._engine import BudgetExceeded
 from firable.analysis.check import check
 from firable.analysis.methods import Method
 from firable.analysis.report import CheckReport
-from firable.analysis.spaces.reachability import Budget, explore
+from firable.analysis.spaces.reachability import REASONS, Budget, explore
 from firable.analysis.spaces.space import S, StateSpace
 from firable.analysis.temporal.queries import answer
 from firable.analysis.verdicts.goals import goals_of
@@ -56,6 +56,7 @@ _DEADLOCKS: Final = ("deadlock-free", "loop.deadlock-free")
 _SEARCHES_MAX: Final = 4  # verdicts for which a cure of their own is looked for, each with the following room
 _EXPLORED_MAX: Final = 1_000_000  # markings of all candidates together
 _CHECKED_MAX: Final = 100_000  # markings of those that are checked whole
+_AS_MANY_MARKINGS: Final = 10  # what each transition of a candidate counts for: to make a net costs, too
 _CHECKED_NETS_MAX: Final = 40
 _ENTRIES_MAX: Final = 6  # transitions that enter a zone, each of which is to be changed
 _GATES_MAX: Final = 8  # for one such transition
@@ -126,6 +127,7 @@ class _Search(Generic[S]):
     def __init__(self, space: StateSpace[S], before: dict[str, Verdict], queries: Sequence[Query]) -> None:
         self._space, self._net, self._before, self._queries = space, space.net, before, queries
         self._fired = _fired(space)
+        self._making = _AS_MANY_MARKINGS * len(self._net.transitions)
         self._explored = self._checked = self._checked_nets = self._searches = 0
         self._after: dict[_Changes, CheckReport | None] = {}
         self._found: list[tuple[_Cured, ...]] = []
@@ -144,7 +146,10 @@ class _Search(Generic[S]):
         self._searches += 1
         self._explored = self._checked = self._checked_nets = 0
         found = (self._best(verdict.name, kind) for kind in self._kinds(verdict))
-        cured = sorted((self._asked_again(one) for one in found if one is not None), key=_rank)
+        try:
+            cured = sorted((self._asked_again(one) for one in found if one is not None), key=_rank)
+        except BudgetExceeded:
+            return ()
         self._found.append(tuple(cured))
         return tuple(one.told(verdict.name) for one in cured)
 
@@ -168,6 +173,8 @@ class _Search(Generic[S]):
         for changes in candidates:
             whole = [one for one in passed if not one.loses]
             if whole and (len(whole) == _ALIKE_MAX or sum(change.size for change in changes) > whole[0].size):
+                break
+            if changes not in self._after and not self._has_room:
                 break
             if (cured := self._tried(name, changes)) is not None:
                 passed.append(cured)
@@ -199,6 +206,8 @@ class _Search(Generic[S]):
         outside = space.algebra.negation(zone)
         entries = {}
         for t in range(len(self._net.transitions)):
+            if space.deadline.over:
+                raise BudgetExceeded(REASONS["time"])
             if space.count(sources := space.algebra.conjunction([outside, space.before(zone, [t])])):
                 entries[t] = sources
         return entries
@@ -242,7 +251,8 @@ class _Search(Generic[S]):
     def _givers(self, taker: str) -> list[str]:
         """The transitions that can give back what the taker takes: each once after it, and nothing else is lost."""
         others = (one.name for one in self._net.transitions if one.name != taker)
-        return [other for other in others if self._is_quiet((capacity(self._net, (taker,), (other,)),))]
+        tried = takewhile(lambda _: self._has_room, others)
+        return [other for other in tried if self._is_quiet(self._changed((capacity(self._net, (taker,), (other,)),)))]
 
     def _arbiters(self, verdict: Verdict) -> Iterator[_Changes]:
         """An arbiter for each conflict component in which transitions compete that none decides."""
@@ -264,14 +274,24 @@ class _Search(Generic[S]):
 
     # Trying them.
 
-    def _is_quiet(self, changes: _Changes) -> bool:
-        """Whether the changed net, explored, keeps every transition that fires, and comes into no contact."""
-        if self._explored > _EXPLORED_MAX:
-            return False
+    @property
+    def _has_room(self) -> bool:
+        """Whether one more candidate may be made."""
+        return self._explored <= _EXPLORED_MAX and not self._space.deadline.over
+
+    def _changed(self, changes: _Changes) -> Net | None:
+        """The net after the changes, if they make one."""
+        self._explored += self._making
         try:
-            space = explore(changed(self._net, changes), budget=self._budget)
+            return changed(self._net, changes)
         except InputError:
+            return None
+
+    def _is_quiet(self, net: Net | None) -> bool:
+        """Whether a changed net, explored, keeps every transition that fires, and comes into no contact."""
+        if net is None:
             return False
+        space = explore(net, budget=self._budget)
         self._explored += space.n_markings
         return space.complete and not space.meet_contact() and self._fired <= _fired(space)
 
@@ -306,12 +326,15 @@ class _Search(Generic[S]):
 
     def _checked_whole(self, changes: _Changes) -> CheckReport | None:
         """The report on the changed net; None where exploring it says enough, or too much was checked already."""
-        if self._checked > _CHECKED_MAX or self._checked_nets == _CHECKED_NETS_MAX or not self._is_quiet(changes):
+        if self._checked > _CHECKED_MAX or self._checked_nets == _CHECKED_NETS_MAX or not self._has_room:
             return None
-        after = check(changed(self._net, changes), budget=self._budget, method=Method.EXPLICIT)
-        self._checked += after.figures.markings
+        net = self._changed(changes)
+        if net is None or not self._is_quiet(net):
+            return None
+        after = check(net, budget=self._budget, method=Method.EXPLICIT)
+        self._checked += self._making + after.figures.markings
         self._checked_nets += 1
-        return after
+        return None if self._space.deadline.over else after
 
     def _is_bearable(self, lost: Verdict) -> bool:
         """Whether a loss is the engineer's to judge; who starves after the change must have been lost before it."""
@@ -324,8 +347,8 @@ class _Search(Generic[S]):
 
     @property
     def _budget(self) -> Budget:
-        """Room for a capacity place more, which at most doubles the markings."""
-        return Budget(markings=2 * self._space.n_markings + 1)
+        """Room for a capacity place more, which at most doubles the markings, in the time that the report has."""
+        return Budget(markings=2 * self._space.n_markings + 1, seconds=self._space.deadline.left_seconds)
 
 
 def _fired(space: StateSpace[Any]) -> set[int]:

@@ -282,6 +282,8 @@ def _differences(verdicts: tuple[Verdict, ...], opened: CheckReport) -> Iterator
         remark = ""
         if open_.status is Status.PROVED and verdict.status is Status.VIOLATED:
             remark = "gates free was too hopeful: here a gate that it opened stays closed"
+            if verdict.witness is not None and not {ACCIDENT, OVERRUN}.isdisjoint(verdict.witness.marking):
+                remark = "gates free knows of no accidents: here one ends the run"
         elif open_.status is Status.VIOLATED and verdict.status is Status.PROVED:
             remark = "the machines keep the cell from the marking that violates it"
         elif open_.status is not verdict.status:

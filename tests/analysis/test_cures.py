@@ -95,6 +95,22 @@ def test_queries_are_asked_again_in_the_time_of_the_report_and_what_stays_open_i
     assert {deadline for _, deadline in asked} == {report.space.deadline}
 
 
+def test_cures_are_looked_for_in_the_time_of_the_report() -> None:
+    report = check(catalogue_net("one_robot_mc_late"), budget=Budget(seconds=600.0))
+    over = report.space.until(Deadline.after(0.0))
+    assert not any(verdict.cures for verdict in explained(replace(report, space=over)))
+    assert any(verdict.cures for verdict in explained(report))
+
+
+def test_all_changes_of_a_cure_make_one_net(monkeypatch: pytest.MonkeyPatch) -> None:
+    net = catalogue_net("philosophers-4")
+    (cure,) = _explained(net)["effective-conflicts"].cures
+    made: list[Net] = []
+    monkeypatch.setattr(Net, "__post_init__", lambda self: made.append(self))
+    after = changed(net, cure.parts)
+    assert (made, len(after.arbiters)) == ([after], len(cure.parts))
+
+
 def test_competitors_without_an_arbiter_are_offered_one() -> None:
     (cure,) = _explained(catalogue_net("philosophers-4"))["effective-conflicts"].cures
     assert len(cure.changes) == 4
@@ -178,10 +194,10 @@ def _by_hand(net: Net, cure: Cure) -> Net:
     """The net changed as the sentences say, read as an engineer reads them."""
     for change in cure.changes:
         if gate := re.fullmatch(r"give (\S+) the gate `(if|unless): (\S+)`", change):
-            net = Gate(gate[1], gate[3], gate[2] == "if").made(net)
+            net = changed(net, [Gate(gate[1], gate[3], gate[2] == "if")])
         elif place := re.fullmatch(_CAPACITY_PLACE, change):
             takers, givers = place[2].split(" and "), place[3].split(" and ")
-            net = CapacityPlace(place[1], None, tuple(takers), tuple(givers)).made(net)
+            net = changed(net, [CapacityPlace(place[1], None, tuple(takers), tuple(givers))])
         else:
             arbiter = re.fullmatch(r"add to `arbiters`: `(\S+): \{among: \[(.+)\], by: priority\}`", change)
             assert arbiter is not None, change

@@ -145,6 +145,8 @@ def test_a_net_that_does_not_wait_for_its_robot_commands_it_while_it_is_busy() -
     assert busy.witness.note == "R is given GRASP at=CV1 while it is at another command"
     assert busy.witness.firings[-1] == ("t1-a/R-busy",)
     replays(report, "loop.busy-machines")
+    remarks = {one.question: one.remark for one in report.differences if one.differs}
+    assert remarks["property.restart"] == "gates free knows of no accidents: here one ends the run"
 
 
 def test_an_exit_that_is_not_cleared_in_time_is_a_collision() -> None:

@@ -410,7 +410,8 @@ def test_choice_is_what_the_arbiter_decides_in_every_turn(data: st.DataObject) -
         for t in (*group.sequence, *group.rest):
             assert value(chosen.granted[f"t{t}"], assignment) == (t in decided)
         if turned:
-            winners = {t for t in group.preference(turn) if value(chosen.winning[f"t{t}"], assignment)}
+            members = group.preference({*group.sequence, *group.rest}, turn)
+            winners = {t for t in members if value(chosen.winning[f"t{t}"], assignment)}
             losers = {t for t in enabled - set(decided) if arbiters.conflicts.input_rivals[t] & winners}
             assert then == group.turn_after(winners, losers, turn)
 

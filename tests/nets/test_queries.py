@@ -143,6 +143,10 @@ def test_a_name_of_the_other_kind_is_told_as_what_it_is(text: str, told: str) ->
     assert told in str(caught.value)
 
 
+def test_a_file_without_a_query_is_refused() -> None:
+    assert codes("# to be written\n") == codes("<property-set></property-set>") == [("F1002", 1, 1)]
+
+
 def test_files_are_told_apart_by_their_first_character(tmp_path: Path) -> None:
     (tmp_path / "a").write_bytes(b"\xef\xbb\xbfa: EF p\n")
     (tmp_path / "b").write_text(f"\n<property-set>{xml('<deadlock/>')}</property-set>", "utf-8")
