@@ -13,7 +13,7 @@ from firable.analysis.methods import Method
 from firable.cli import text
 from firable.cli.choice import OneOf
 from firable.cli.evidence_files import is_evidence
-from firable.cli.files import FOLDER, NETS, READ, WRITTEN, net_files
+from firable.cli.files import FOLDER, NETS, READ, WRITTEN_NET, net_files
 from firable.cli.loop import loop_report, machines_option, show_loop
 from firable.cli.net_files import demand_a_net_file
 from firable.cli.options import (
@@ -114,7 +114,7 @@ class _Asked:
     "--loop-net",
     "loop_file",
     metavar="FILE",
-    type=WRITTEN,
+    type=WRITTEN_NET,
     help="Write the net that NET and its --machines are together, as a net file (*.firable.yaml).",
 )
 @page_option

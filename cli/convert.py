@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from firable.cli import text
-from firable.cli.files import READ, WRITTEN
+from firable.cli.files import READ, WRITTEN_NET
 from firable.cli.net_files import write_net
 from firable.cli.options import load_net, write_text
 
@@ -18,7 +18,7 @@ from firable.cli.options import load_net, write_text
     "-o",
     "--output",
     metavar="FILE",
-    type=WRITTEN,
+    type=WRITTEN_NET,
     required=True,
     help="*.firable.yaml or *.pnml: the extension says which.",
 )

@@ -3,7 +3,8 @@
 An option says by its type which it is, and a command has nothing to remember: each file is compared with those named
 before it while the command line is read, so before anything is read or written. Two names are one file where the file
 system says so, over links of both kinds. What is written into a folder is named after what was found, and compared when
-that is known, before any of it is written (`refuse_to_overwrite`).
+that is known, before any of it is written (`refuse_to_overwrite`). And no output may have the name of a net, a plant
+file or a binding unless it is one: what people write is not written over by something else.
 
 Rejected: a list in each command of what it reads. The next option is missing in it, and a net is lost.
 """
@@ -12,11 +13,12 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -26,6 +28,13 @@ if TYPE_CHECKING:
 
 CATALOGUE: Final = "catalogue:"
 NET_FILES: Final = (".firable.yaml", ".firable.yml")
+OTHER_FILES: Final = {
+    ".plant.yaml": "a plant file",
+    ".bind.yaml": "a binding",
+    ".tasks.yaml": "a file of tasks",
+    ".layout.yaml": "a layout file",
+}
+"""What else people write, by the suffix of its name."""
 FOLDERS_MAX: Final = 20_000
 """So many folders are searched for net files, in about a second: more than projects have, and less than disks."""
 _INSTALLED: Final = frozenset({"node_modules"})  # virtual environments are known by what is in them
@@ -147,12 +156,24 @@ def _later(_: str) -> Iterable[str]:
 class FileType(click.types.StringParamType):
     """The type of options and arguments that name files: which those are, and whether they are written."""
 
-    def __init__(self, files: Callable[[str], Iterable[str]], *, is_written: bool) -> None:
+    def __init__(
+        self,
+        files: Callable[[str], Iterable[str]],
+        *,
+        is_written: bool,
+        never: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
         self.files = files
         self.is_written = is_written
+        self.never = never
+        """What it never is, by the suffix of its name."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """The name as it is; raises `InputError` F1017 where an output would overwrite another file of the command."""
+        """The name as it is.
+
+        Raises `InputError` F1017 where an output would overwrite another file of the command, or is named like what
+        people write.
+        """
         argument: str = super().convert(value, param, ctx)
         if param is not None and ctx is not None:
             named = _Named(param.opts[0], argument, self)
@@ -163,15 +184,27 @@ class FileType(click.types.StringParamType):
                 elif other.is_written:
                     _compare(other.by, other.files, named)
             known.append(named)
+            self._refuse_what_it_never_is(argument, param.opts[0])
         return argument
+
+    def _refuse_what_it_never_is(self, argument: str, by: str) -> None:
+        from firable.nets.diagnostics import Diagnostic, InputError
+        from firable.nets.source import printable
+
+        for suffix, what in self.never.items():
+            if argument.lower().endswith(suffix):
+                message = f"{printable(argument)}: that is the name of {what}, which {by} does not write"
+                raise InputError([Diagnostic("F1017", message, "name another file")])
 
 
 READ: Final = FileType(_read, is_written=False)
 """A file that is read, or `catalogue:NAME`."""
 NETS: Final = FileType(_read_below, is_written=False)
 """Such a file, or a folder, which stands for the net files below it."""
-WRITTEN: Final = FileType(_written, is_written=True)
+WRITTEN: Final = FileType(_written, is_written=True, never=OTHER_FILES | dict.fromkeys(NET_FILES, "a net file"))
 """A file that is written, over what stands there; - is standard output."""
+WRITTEN_NET: Final = FileType(_written, is_written=True, never=OTHER_FILES)
+"""A net that is written, over what stands there."""
 FOLDER: Final = FileType(_later, is_written=True)
 """A folder that files are written into, whose names are known later."""
 JOURNAL: Final = FileType(journal_files, is_written=True)

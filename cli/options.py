@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 from click.core import ParameterSource
 
 from firable.cli.choice import OneOf
-from firable.cli.files import CATALOGUE, READ, WRITTEN, is_folder, nets_below, refuse_to_overwrite, stem
+from firable.cli.files import CATALOGUE, OTHER_FILES, READ, WRITTEN, is_folder, nets_below, refuse_to_overwrite, stem
 from firable.cli.finite import FiniteRange
 from firable.cli.report import Outcome, Report, document, exit_code_of, worst
 
@@ -206,19 +206,11 @@ def _plant_beside(argument: str) -> Path:
     return Path(f"{stem(argument)}.plant.yaml")
 
 
-_OTHER_FILES: Final = {
-    ".plant.yaml": "a plant file",
-    ".bind.yaml": "a binding",
-    ".tasks.yaml": "a file of tasks",
-    ".layout.yaml": "a layout file",
-}
-
-
 def refuse_a_net(file: str, wanted: str, then: str = "") -> None:
     """A net is no bundle: say what is wanted instead, and how a bundle is made of it, for the command `then`."""
     from firable.nets.loading import PNML_SUFFIXES, TEXT_SUFFIXES
 
-    for suffix, what in _OTHER_FILES.items():
+    for suffix, what in OTHER_FILES.items():
         if file.lower().endswith(suffix):
             raise click.UsageError(f"'{file}' is {what}, and {wanted}")
     if file.startswith(CATALOGUE) or Path(file).suffix.lower() in PNML_SUFFIXES | TEXT_SUFFIXES:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from firable.cli import text
-from firable.cli.files import FOLDER, READ, WRITTEN
+from firable.cli.files import FOLDER, READ, WRITTEN_NET
 from firable.cli.net_files import demand_a_net_file, is_schema, schema_told, write_net
 from firable.cli.options import (
     analysis_options,
@@ -58,7 +58,7 @@ tasks_option = click.option(
     "-o",
     "--output",
     metavar="FILE",
-    type=WRITTEN,
+    type=WRITTEN_NET,
     help="Write the detailed net there, as a net file (*.firable.yaml).",
 )
 @click.option("--cell", metavar="NAME", default="", help="The name of the detailed net; by default that of NET.")

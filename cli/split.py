@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from firable.cli import text
-from firable.cli.files import FOLDER, READ, WRITTEN
+from firable.cli.files import FOLDER, READ, WRITTEN_NET
 from firable.cli.finite import FiniteRange
 from firable.cli.net_files import demand_a_net_file, write_net, write_nets
 from firable.cli.options import (
@@ -63,7 +63,7 @@ _CONTROLLERS_MAX = 30  # told of in text; the JSON has them all
     "-o",
     "--output",
     metavar="FILE",
-    type=WRITTEN,
+    type=WRITTEN_NET,
     help="Write the net with its new owners as a net file (*.firable.yaml).",
 )
 @click.option(

@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 import pytest
 
-from firable.cli.files import FOLDER, JOURNAL, MADE, NETS, OLD_JOURNAL, READ, WRITTEN, FileType
+from firable.cli.files import FOLDER, JOURNAL, MADE, NETS, OLD_JOURNAL, READ, WRITTEN, WRITTEN_NET, FileType
 from firable.cli.main import COMMANDS, firable, main
 from firable.nets.catalogue import catalogue_path
 
@@ -74,8 +74,10 @@ def named_as(kind: FileType) -> set[tuple[str, str]]:
 def pairs() -> Iterator[tuple[str, str, str]]:
     """Each command with an output and with what it reads or writes besides; twice the same where it is repeatable."""
     for name, command in commands():
-        written = [one for one in command.params if {WRITTEN, JOURNAL} & {*types_of(one)}]
-        files = [one for one in command.params if {WRITTEN, JOURNAL, READ, NETS, OLD_JOURNAL} & {*types_of(one)}]
+        written = [one for one in command.params if {WRITTEN, WRITTEN_NET, JOURNAL} & {*types_of(one)}]
+        files = [
+            one for one in command.params if {WRITTEN, WRITTEN_NET, JOURNAL, READ, NETS, OLD_JOURNAL} & {*types_of(one)}
+        ]
         for output in written:
             for other in files:
                 if other is not output or output.multiple:
@@ -99,16 +101,16 @@ def line(name: str, *named: tuple[str, str]) -> list[str]:
 def spelled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
     """A file by several names: its own, a way around, a symbolic link and a hard link."""
     monkeypatch.chdir(tmp_path)
-    file = tmp_path / "cell.firable.yaml"
+    file = tmp_path / "cell.yaml"
     file.write_bytes(catalogue_path("one_robot").read_bytes())
     (tmp_path / "folder").mkdir()
-    (tmp_path / "link.firable.yaml").symlink_to(file.name)
-    (tmp_path / "hard.firable.yaml").hardlink_to(file)
+    (tmp_path / "link.yaml").symlink_to(file.name)
+    (tmp_path / "hard.yaml").hardlink_to(file)
     return {
         "itself": file.name,
         "around": str(tmp_path / "folder" / ".." / file.name),
-        "symbolic link": "link.firable.yaml",
-        "hard link": "hard.firable.yaml",
+        "symbolic link": "link.yaml",
+        "hard link": "hard.yaml",
     }
 
 
@@ -135,11 +137,32 @@ def test_no_output_is_written_over_another_file_of_the_command(
             assert "hint: name another file" in said
             assert file.read_bytes() == before
     assert sorted(path.name for path in Path.cwd().iterdir()) == [
-        "cell.firable.yaml",
+        "cell.yaml",
         "folder",
-        "hard.firable.yaml",
-        "link.firable.yaml",
+        "hard.yaml",
+        "link.yaml",
     ]
+
+
+@pytest.mark.parametrize(
+    "name", ["cell.firable.yaml", "cell.firable.yml", "Cell.plant.yaml", "cell.bind.yaml", "cell.layout.yaml"]
+)
+def test_no_output_is_named_like_what_people_write_unless_it_is_a_net(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path(name).write_text("mine")
+    for command, option in sorted(named_as(WRITTEN)):
+        assert main(line(command, (option, name))) == 2
+        said = capsys.readouterr().err
+        assert f"error[F1017]: {name}: that is the name of a" in said
+        assert f"which {option} does not write" in said
+    for command, option in sorted(named_as(WRITTEN_NET)):
+        if "firable" not in name:
+            assert main(line(command, (option, name))) == 2
+            assert "that is the name of a" in capsys.readouterr().err
+    assert Path(name).read_text() == "mine"
+    assert main(["convert", "catalogue:one_robot", "-o", "other.firable.yaml"]) == 0
 
 
 def test_two_outputs_are_two_files_before_there_is_any(
@@ -158,11 +181,12 @@ def test_two_outputs_are_two_files_before_there_is_any(
 def test_no_output_is_written_over_a_net_of_a_folder_that_is_read(
     spelled: dict[str, str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    before = Path("cell.firable.yaml").read_bytes()
-    assert main(["check", ".", "--write", "json", spelled["around"]]) == 2
+    net = Path(spelled["itself"]).rename("cell.firable.yaml")
+    before = net.read_bytes()
+    Path("report.json").symlink_to(net)
+    assert main(["check", ".", "--write", "json", "report.json"]) == 2
     assert "--write would overwrite what the command reads" in capsys.readouterr().err
-    assert Path("cell.firable.yaml").read_bytes() == before
-    assert main(["check", ".", "--write", "json", "folder/cell.firable.yaml"]) == 0, "it does not stand there yet"
+    assert net.read_bytes() == before
 
 
 @pytest.mark.parametrize(
@@ -178,9 +202,11 @@ def test_no_output_is_written_over_a_net_of_a_folder_that_is_read(
 def test_no_output_is_written_over_what_is_found_beside_a_file_that_is_read(
     name: str, command: tuple[str, ...], spelled: dict[str, str], capsys: pytest.CaptureFixture[str]
 ) -> None:
+    Path(spelled["itself"]).rename("cell.firable.yaml")
     file = Path(name)
     file.write_text("mine", encoding="utf-8")
-    assert main([*command, str(Path("folder") / ".." / name)]) == 2
+    Path("link").symlink_to(name)
+    assert main([*command, str(Path("folder") / ".." / "link")]) == 2
     assert "would overwrite what the command reads\n" in capsys.readouterr().err
     assert file.read_text("utf-8") == "mine"
 
@@ -203,7 +229,10 @@ def test_nothing_in_a_folder_is_written_over_another_output(
     capsys.readouterr()
     for file in (names := sorted(Path("out").iterdir())):
         file.unlink()
-    assert main([*command, "--write", "json", str(names[0])]) == 2
+    here = names[0] if names[0].suffix == ".json" else Path("here.json")
+    if here != names[0]:
+        names[0].symlink_to(Path("..") / here)  # the name of a net is refused at once
+    assert main([*command, "--write", "json", str(here)]) == 2
     printed = capsys.readouterr()
     said = f"{names[0]}: what is written there would overwrite what --write writes"
     assert f"error[F1017]: {said}\n  hint: name another folder" in printed.err
