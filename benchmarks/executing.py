@@ -31,6 +31,7 @@ from firable.executor.drivers.driver import Clock, Listener
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import Journal
 from firable.executor.journal.sqlite_journal import SqliteJournal
+from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.host import Host
 from firable.executor.operating.taken_up import opened
 from firable.executor.protocol.controller import LocalController
@@ -107,7 +108,7 @@ def run_host(
 
     paths = (None, None) if folder is None else (Path(folder) / "journal", Path(folder) / "trace")
     with opened(decomposition, "d", *paths) as files:
-        host = Host(decomposition, Knocking([], 0.0), files.recorder, journal=files.journal, operator=operate)
+        host = Host(decomposition, Knocking([], 0.0), files.recorder, Conduct(operator=operate), journal=files.journal)
         _, seconds = timed(lambda: asyncio.run(host.main()))
         return seconds / sum(files.recorder.firings.values())
 

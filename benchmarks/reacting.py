@@ -48,6 +48,7 @@ from firable.executor.drivers.cancelling import ended
 from firable.executor.drivers.device import Point, Value
 from firable.executor.drivers.driver import Answer, Clock, Driver, Listener, Reading
 from firable.executor.drivers.far_side.modbus_server import ModbusTcpEnd
+from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.executor.protocol.controller import LocalController
@@ -170,7 +171,7 @@ class PingPong:
 
 def execution_with(driver: Driver) -> Host:
     """The net, run with a driver."""
-    return Host(split(NET), driver, Recorder(NET, "", None), overdue_seconds=60.0)
+    return Host(split(NET), driver, Recorder(NET, "", None), Conduct(overdue_seconds=60.0))
 
 
 def between_changes() -> Iterator[float]:

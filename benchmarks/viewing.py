@@ -31,6 +31,7 @@ from firable.cli.view.live import LivePage
 from firable.decompose.splitting.cut import split
 from firable.executor import Host
 from firable.executor.drivers.dry_run import DryRunDriver
+from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.control import Endpoint, application, listening
 from firable.executor.operating.recorder import Recorder
 from firable.nets.catalogue import family_net
@@ -74,7 +75,7 @@ async def serve(command_seconds: float) -> None:
     """Run the net, and serve its page until this process is ended."""
     decomposition = split(family_net(NET))
     driver = DryRunDriver(decomposition.subnets, command_seconds)
-    host = Host(decomposition, driver, Recorder(decomposition.net, NET, None), overdue_seconds=600.0)
+    host = Host(decomposition, driver, Recorder(decomposition.net, NET, None), Conduct(overdue_seconds=600.0))
     endpoint = Endpoint("127.0.0.1", 0, TOKEN)
     firings = host.recorder.firings
     app = application(host, endpoint, lambda: str(sum(firings.values())).encode(), LivePage(host))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import click
@@ -12,11 +13,8 @@ from firable.cli.report import Report
 from firable.cli.watched import AFTER_A_FAULT, machines_verdict, show_coalesced
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from firable.executor import Answer, Operator, PlantModel, RunReport, Watch
-    from firable.executor.operating.log import Log
-    from firable.executor.operating.service import Service
+    from firable.executor import PlantModel, RunReport
+    from firable.executor.operating.conduct import Conduct
     from firable.nets.bundle import Bundle
     from firable.nets.verdict import Verdict
 
@@ -24,40 +22,13 @@ _BLOCKED_SHOWN = 6
 """So many transitions are told of, and what they waited for when somebody stopped the run."""
 
 
-def run_bound_of(
-    path: str,
-    bundle: Bundle,
-    bind: str,
-    trace: str | None,
-    operator: Operator | None,
-    journal: str | None,
-    said: Mapping[str, Answer],
-    *,
-    resume: bool,
-    plant: PlantModel | None,
-    watch: Watch,
-    service: Service | None,
-    log: Log | None,
-) -> Report:
+def run_bound_of(path: str, bundle: Bundle, bind: str, conduct: Conduct, plant: PlantModel | None) -> Report:
     """Run until the operator stops it or nothing can go on, and report how it ended."""
     from firable.executor.drivers.binding import read_binding
     from firable.executor.operating.running import run_bound
 
-    with told_aside(_told, log) as tell:
-        report = run_bound(
-            bundle,
-            read_binding(bind),
-            trace_path=trace,
-            operator=operator,
-            tell=tell,
-            journal_path=journal,
-            resume=resume,
-            said=said,
-            plant=plant,
-            watch=watch,
-            service=service,
-            log=log,
-        )
+    with told_aside(_told, conduct.log) as tell:
+        report = run_bound(bundle, read_binding(bind), replace(conduct, tell=tell), plant=plant)
     known = report.to_json()
     kept = ("state", "message", "marking", "blocked", "firings", "commands", "messages", "coalesced", "divergence")
     return Report(
@@ -65,7 +36,6 @@ def run_bound_of(
         path,
         bundle.net,
         (_verdict(report, bind), *machines_verdict(report, f"run on the machines of {bind}")),
-        files=(trace,) if trace else (),
         run={**{key: known[key] for key in kept if key in known}, "seconds": report.simulated_seconds, "binding": bind},
     )
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
 
@@ -23,11 +23,8 @@ from firable.nets.source import printable
 if TYPE_CHECKING:
     from firable.executor.drivers.driver import Latched
     from firable.executor.links.link import Link
-    from firable.executor.operating.log import Log
-    from firable.executor.operating.running import Watch
-    from firable.executor.operating.service import Service
+    from firable.executor.operating.conduct import Conduct
     from firable.executor.operating.situation import Situation
-    from firable.executor.protocol.commands import Answer
     from firable.nets.bundle import Bundle
     from firable.nets.diagnostics import Diagnostic
     from firable.nets.machines.plant_file import PlantModel
@@ -59,6 +56,11 @@ class HostOptions:
     def is_one_of_several(self) -> bool:
         """Whether only a part of the cell runs here."""
         return bool(self.controller) or self.coordinator
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether the cell here is simulated: it is all here, and on no machines."""
+        return self.bind is None and not self.is_one_of_several
 
     def refuse_alone(self) -> None:
         """Refuse what only a host among others has use for."""
@@ -154,18 +156,7 @@ def host_options(command: F) -> F:
     return command
 
 
-def run_host_of(
-    path: str,
-    bundle: Bundle,
-    options: HostOptions,
-    trace: str | None,
-    said: Mapping[str, Answer],
-    service: Service | None,
-    log: Log | None,
-    *,
-    plant: PlantModel | None,
-    watch: Watch,
-) -> Report:
+def run_host_of(path: str, bundle: Bundle, options: HostOptions, conduct: Conduct, plant: PlantModel | None) -> Report:
     """Run this host until it is stopped or fails, and report how it ended."""
     from firable.executor.operating.hosting import machines_of, run_host
 
@@ -179,21 +170,14 @@ def run_host_of(
     link, warnings = _link(bundle, machines, options)
     for warning in warnings:
         text.show_diagnostic(warning)
-    with told_aside(_told, log) as tell:
+    with told_aside(_told, conduct.log) as tell:
         report = run_host(
             bundle,
             machines,
             driver(latched=False),
             link,
-            trace_path=trace,
-            journal_path=options.journal,
-            resume=options.resume,
-            said=said,
-            tell=tell,
-            service=service,
-            log=log,
+            replace(conduct, tell=tell),
             plant=plant,
-            watch=watch,
             latched=partial(driver, latched=True),
         )
     return Report(
@@ -201,7 +185,6 @@ def run_host_of(
         path,
         bundle.net,
         (_verdict(report.situation, machines), *machines_verdict(report, "run of one host, of its own machines")),
-        files=(trace,) if trace else (),
         run=report.to_json(),
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from firable.executor import Answer, Operator, RunReport
+    from firable.executor.operating.conduct import Conduct
+    from firable.executor.operating.running import SimulatedCell
+    from firable.nets.bundle import Bundle
     from firable.nets.net import Net
     from firable.nets.verdict import Verdict
 
@@ -132,7 +136,7 @@ def run(
     served = ServeOptions(serve, token_file, serve_tls, operators, open_)
     if open_ and not is_given("speed"):
         speed = "1"
-    is_simulated = options.bind is None and not options.is_one_of_several
+    is_simulated = options.is_simulated
     if (serve is not None or open_) and _SPEEDS[speed] is None and is_simulated:
         raise click.UsageError(
             "in virtual time a run is over before anybody acts: with --serve or --open, name --speed 1 or 10"
@@ -152,7 +156,8 @@ def run(
         from firable.cli.loop import read_machines
         from firable.cli.stepping import stepping
         from firable.executor import Watch, load
-        from firable.executor import run as run_bundle
+        from firable.executor.operating.conduct import Conduct
+        from firable.executor.operating.running import SimulatedCell
 
         _demand_a_file(trace)
         loaded = load(bundle, trust)
@@ -164,54 +169,42 @@ def run(
         if step:
             stepped = stepping(pace, to_stderr=format_ == "json")
         with log_to(log) as told_to, stepped as operator:
+            conduct = Conduct(
+                trace=trace,
+                journal_path=options.journal,
+                resume=options.resume,
+                said=_said(loaded.net, say),
+                watch=Watch(watch),
+                operator=operator,
+                service=service,
+                log=told_to,
+            )
             if options.is_one_of_several:
-                said = _said(loaded.net, say)
-                return run_host_of(
-                    bundle, loaded, options, trace, said, service, told_to, plant=model, watch=Watch(watch)
-                )
-            if options.bind is not None:
-                return run_bound_of(
-                    bundle,
-                    loaded,
-                    options.bind,
-                    trace,
-                    operator,
-                    options.journal,
-                    _said(loaded.net, say),
-                    resume=options.resume,
-                    plant=model,
-                    watch=Watch(watch),
-                    service=service,
-                    log=told_to,
-                )
-            assert model is not None, "a simulated cell is made of its plant"
-            with told_aside(_told, told_to) as tell:
-                report = run_bundle(
-                    loaded,
-                    model,
-                    workpieces=workpieces,
-                    seed=seed,
-                    speed=_SPEEDS[speed],
-                    trace_path=trace,
-                    journal_path=options.journal,
-                    resume=options.resume,
-                    said=_said(loaded.net, say),
-                    watch=Watch(watch),
-                    service=service,
-                    log=told_to,
-                    tell=partial(_if_not_reported, tell),
-                    operator=operator,
-                )
-        return Report(
-            "run",
-            bundle,
-            loaded.net,
-            _verdicts(report, workpieces, seed),
-            files=(trace,) if trace else (),
-            run={**report.to_json(), "workpieces": workpieces, "seed": seed},
-        )
+                report = run_host_of(bundle, loaded, options, conduct, model)
+            elif options.bind is not None:
+                report = run_bound_of(bundle, loaded, options.bind, conduct, model)
+            else:
+                assert model is not None, "a simulated cell is made of its plant"
+                simulated = SimulatedCell(model, workpieces, seed, _SPEEDS[speed])
+                report = _run_simulated_of(bundle, loaded, simulated, conduct)
+        return replace(report, files=(trace,) if trace else ())
 
     return answer("run", format_, make, _show)
+
+
+def _run_simulated_of(path: str, bundle: Bundle, cell: SimulatedCell, conduct: Conduct) -> Report:
+    """Run until the workpieces have gone through, or nothing can go on, and report how it ended."""
+    from firable.executor.operating.running import run_simulated
+
+    with told_aside(_told, conduct.log) as tell:
+        report = run_simulated(bundle, cell, replace(conduct, tell=partial(_if_not_reported, tell)))
+    return Report(
+        "run",
+        path,
+        bundle.net,
+        _verdicts(report, cell.workpieces, cell.seed),
+        run={**report.to_json(), "workpieces": cell.workpieces, "seed": cell.seed},
+    )
 
 
 def _told(_kind: str, sentence: str) -> None:

@@ -17,8 +17,9 @@ imports `semantics` and `nets` and nothing that proves.
 
 from firable.executor.cell.disturbances import Disturbance, Drops, NeverCompletes, StuckSensor
 from firable.executor.drivers.driver import Driver
+from firable.executor.operating.conduct import Watch
 from firable.executor.operating.host import Host
-from firable.executor.operating.running import Operator, RunReport, Watch, execute, load, run
+from firable.executor.operating.running import Operator, RunReport, execute, load, run
 from firable.executor.operating.situation import Blocked, Situation, State
 from firable.executor.protocol.commands import Answer
 from firable.nets.machines.plant_file import PlantModel, read_plant

@@ -22,7 +22,7 @@ the protocol, for no gain in one process.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Collection, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Collection, Sequence
 from typing import Final
 
 from firable.executor.drivers.driver import Driver, Latched
@@ -35,13 +35,14 @@ from firable.executor.operating.acts import Acts
 from firable.executor.operating.aside import UntoldError
 from firable.executor.operating.clock import RunClock
 from firable.executor.operating.coalesced import Coalesced
+from firable.executor.operating.conduct import UNATTENDED, Conduct, Watch
 from firable.executor.operating.dispatch import Dispatch
 from firable.executor.operating.figures import Figures
 from firable.executor.operating.groups import Groups
 from firable.executor.operating.items import SignalRead
 from firable.executor.operating.latch import Latch
 from firable.executor.operating.local_monitor import LocalMonitor
-from firable.executor.operating.log import NOT_OBEYED, TURNED_AWAY, Log
+from firable.executor.operating.log import NOT_OBEYED, TURNED_AWAY
 from firable.executor.operating.monitor import Divergence, Monitor
 from firable.executor.operating.peers import Peers
 from firable.executor.operating.recorder import TRACE, Recorder
@@ -57,9 +58,6 @@ from firable.nets.decomposition import Decomposition
 _END: Final = "end"
 """Under which the journal keeps, beside the trace, that all the work of the run was done."""
 
-Told = Callable[[str, str], None]
-"""Who is told what happens: the kind (`connected`, `lost`, `refused`, `held`, `driver`, ...), and a sentence."""
-
 
 class Host:
     """Machines of a decomposition with a driver, all of them where there is no link; `main` runs them to the end."""
@@ -69,29 +67,24 @@ class Host:
         decomposition: Decomposition,
         driver: Driver,
         recorder: Recorder,
+        conduct: Conduct = UNATTENDED,
         *,
         machines: Collection[str] | None = None,
         link: Link | None = None,
         journal: Journal | None = None,
         speed: float = 1.0,
         begin_seconds: float = 0.0,
-        overdue_seconds: float = 120.0,
         is_complete: Callable[[], bool] = lambda: False,
-        operator: Callable[[Host], Awaitable[None]] | None = None,
-        resume: bool = False,
-        said: Mapping[str, Answer] | None = None,
-        tell: Told | None = None,
         monitor: Monitor | LocalMonitor | None = None,
-        stop_at_divergence: bool = False,
         figures: Figures | None = None,
         patience: Patience | None = None,
-        log: Log | None = None,
         latched: Callable[[], Latched] | None = None,
     ) -> None:
         self.decomposition = decomposition
         self.net = decomposition.net
         self.driver = driver
         self.recorder = recorder
+        self.conduct = conduct
         self.journal = journal or MemoryJournal()
         everything = (*coordinators(decomposition), *(subnet.name for subnet in decomposition.subnets))
         self.machines = everything if machines is None else machines
@@ -102,20 +95,17 @@ class Host:
         self.is_whole = link is None
         self.speed = speed
         self.begin_seconds = begin_seconds
-        self.overdue_seconds = overdue_seconds
         self.is_complete = is_complete
-        self.operator = operator
-        self.operated = operator is not None
+        self.operated = conduct.operator is not None
         self.served = False
         """Whether an operator may act from elsewhere."""
-        self.tell = tell
+        self.tell = conduct.tell
         self.divergence: Divergence | None = None
-        self.stop_at_divergence = stop_at_divergence
         self.watching = None if monitor is None else Watching(monitor, self._diverged)
         self.figures = figures
-        self.log = log
-        recorder.observers += [one.seen for one in (self.watching, figures, log) if one is not None]
-        self.said = said or {}
+        self.log = conduct.log
+        recorder.observers += [one.seen for one in (self.watching, figures, self.log) if one is not None]
+        self.said = conduct.said
         """What the operator has said beforehand of commands, by place."""
         self.patience = patience or Patience()
         self.latched = latched
@@ -126,7 +116,7 @@ class Host:
         self.turn = 0
         self.clock: RunClock | None = None
         self.coalesced = Coalesced(driver)
-        self.begin(resume=resume)
+        self.begin(resume=conduct.resume)
         if figures is not None and self.taking_up is not None:
             figures.taken_up(self.marking)
         if isinstance(monitor, LocalMonitor):
@@ -134,7 +124,7 @@ class Host:
 
     def begin(self, *, resume: bool) -> None:
         """Begin a life, with the machines of the protocol as the journal holds them."""
-        self.dispatch = Dispatch(self, self.overdue_seconds)
+        self.dispatch = Dispatch(self, self.conduct.overdue_seconds)
         self.groups = Groups(self)
         self.acts = Acts(
             self.decomposition,
@@ -408,7 +398,7 @@ class Host:
         self.divergence = found
         self.recorder.note(found.at_seconds, "divergence", message=str(found))
         self.groups.wake()
-        if self.stop_at_divergence:
+        if self.conduct.watch is Watch.STOP:
             self.fail(otherwise(found))
         else:
             self.tell_operator("divergence", otherwise(found))

@@ -11,21 +11,18 @@ import ssl
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Final
 
 from firable.executor.drivers.driver import Driver, Latched
 from firable.executor.links.link import Greeting, Link
-from firable.executor.operating.host import Host, Told
+from firable.executor.operating.conduct import UNATTENDED, Conduct, Watch
+from firable.executor.operating.host import Host
 from firable.executor.operating.local_monitor import LocalMonitor
-from firable.executor.operating.log import Log
 from firable.executor.operating.monitor import Divergence
 from firable.executor.operating.own_certificate import fault_of, fault_of_authority
-from firable.executor.operating.running import Watch
-from firable.executor.operating.service import Service, figures_for, patience_with, run_to_the_end
+from firable.executor.operating.service import figures_for, patience_with, run_to_the_end
 from firable.executor.operating.situation import Situation
 from firable.executor.operating.taken_up import opened
-from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.deciders import TOP, controller_of, coordinator_at, coordinators
 from firable.nets.bundle import Bundle
 from firable.nets.decomposition import Decomposition
@@ -178,55 +175,40 @@ def run_host(
     machines: tuple[str, ...],
     driver: Driver,
     link: Link,
+    conduct: Conduct = UNATTENDED,
     *,
-    trace_path: Path | str | None = None,
-    journal_path: Path | str | None = None,
-    resume: bool = False,
-    said: Mapping[str, Answer] | None = None,
-    overdue_seconds: float = 120.0,
-    tell: Told | None = None,
-    service: Service | None = None,
-    log: Log | None = None,
     plant: PlantModel | None = None,
-    watch: Watch = Watch.TELL,
     latched: Callable[[], Latched] | None = None,
 ) -> HostReport:
     """Run a host until it is stopped (Ctrl-C, SIGTERM, an operator) or fails.
 
-    `resume` ends the hold after a restart by itself; `said` is what an operator says of commands, by place, where no
-    machine can tell what became of them. Where a `plant` says what the machines should do, those here are held against
-    it as the run goes (`watch`), until it is taken up or reset. With a `service`, and `latched` to make the driver of
-    the same machines anew, it stays after an emergency stop until that is reset. Raises `InputError` as link, journal
-    and trace do, and F5003 where the plant does not fit.
+    Where a `plant` says what the machines should do, those here are held against it as the run goes, until it is taken
+    up or reset. With a service, and `latched` to make the driver of the same machines anew, it stays after an emergency
+    stop until that is reset. Raises `InputError` as link, journal and trace do, and F5003 where the plant does not fit.
     """
     controllers = [subnet.name for subnet in bundle.decomposition.subnets if subnet.name in machines]
     monitor = None
-    if plant is not None and watch is not Watch.IGNORE:
+    if plant is not None and conduct.watch is not Watch.IGNORE:
         monitor = LocalMonitor(bundle.decomposition, controllers, plant)
-    with opened(bundle.decomposition, bundle.digest, journal_path, trace_path, machines=machines) as files:
-        figures = figures_for(bundle.net, service, machines)
+    with opened(bundle.decomposition, bundle.digest, conduct.journal_path, conduct.trace, machines=machines) as files:
+        figures = figures_for(bundle.net, conduct.service, machines)
         host = Host(
             bundle.decomposition,
             driver,
             files.recorder,
+            conduct,
             machines=machines,
             link=link,
             journal=files.journal,
             begin_seconds=files.begin_seconds,
-            overdue_seconds=overdue_seconds,
             patience=patience_with(driver),
-            resume=resume,
-            said=said,
-            tell=tell,
             figures=figures,
-            log=log,
             monitor=monitor,
-            stop_at_divergence=watch is Watch.STOP,
             latched=latched,
         )
         if files.is_taken_up:
             host.unwatch()
-        situation = run_to_the_end(host, service, figures)
+        situation = run_to_the_end(host, figures)
     return HostReport(
         situation,
         machines,

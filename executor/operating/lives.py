@@ -26,7 +26,8 @@ async def to_the_end(run: Host) -> Situation:
     """Live until the end of the last life; returns how it ended."""
     if run.log is not None:
         run.log.began(run.net.name, [*run.coordinators, *run.controllers])
-    operator = [] if run.operator is None else [asyncio.create_task(run.operate(run.operator), name="operator")]
+    acts = run.conduct.operator
+    operator = [] if acts is None else [asyncio.create_task(run.operate(acts), name="operator")]
     for task in operator:
         task.add_done_callback(run.task_ended)
     latch.go_on(run)

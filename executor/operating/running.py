@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,8 @@ from firable.executor.cell.plant import Plant
 from firable.executor.drivers.binding import Binding
 from firable.executor.drivers.bound import bound_driver
 from firable.executor.drivers.simulated import SimulatedDriver
-from firable.executor.operating.host import Host, Told
+from firable.executor.operating.conduct import UNATTENDED, Conduct, Told, Watch
+from firable.executor.operating.host import Host
 from firable.executor.operating.log import Log
 from firable.executor.operating.monitor import Divergence, Monitor
 from firable.executor.operating.recorder import LineStream
@@ -37,17 +37,19 @@ from firable.nets.machines.plant_file import PlantModel, misfits
 from firable.nets.net import Net
 from firable.nets.right_to_run import unproved
 
-
-class Watch(StrEnum):
-    """What to do when the machines do what their model excludes: tell, or stop them too; or do not look."""
-
-    TELL = "tell"
-    STOP = "stop"
-    IGNORE = "ignore"
-
-
 Operator = Callable[[Host], Awaitable[None]]
 """A coroutine that runs beside the cell and uses its controls."""
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatedCell:
+    """The cell that stands in the place of machines, what goes through it and how fast: as for `run`."""
+
+    plant: PlantModel
+    workpieces: int
+    seed: int = 0
+    speed: float | None = None
+    disturbances: Iterable[Disturbance] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,27 +149,20 @@ def run(
     where the plant does not fit it, both before a file is touched; F1017 where the trace cannot be written, and F5031
     to F5035 where the journal or the simulated cell cannot be gone on with.
     """
-    # A run that is refused has touched no file.
-    _check(plant, bundle.net, workpieces, speed, overdue_seconds, unproved(bundle))
-    return execute(
-        bundle.decomposition,
-        plant,
-        workpieces=workpieces,
-        seed=seed,
-        speed=speed,
+    cell = SimulatedCell(plant, workpieces, seed, speed, disturbances)
+    conduct = Conduct(
         trace=trace_path,
-        overdue_seconds=overdue_seconds,
-        disturbances=disturbances,
-        operator=operator,
         journal_path=journal_path,
-        digest=bundle.digest,
         resume=resume,
-        said=said,
+        said=said or {},
         watch=watch,
+        overdue_seconds=overdue_seconds,
+        operator=operator,
         service=service,
         log=log,
         tell=tell,
     )
+    return run_simulated(bundle, cell, conduct)
 
 
 def execute(
@@ -194,34 +189,53 @@ def execute(
 
     `digest` names what runs, in the journal. Raises `InputError` F5003 where the plant does not fit the net.
     """
-    _check(plant, decomposition.net, workpieces, speed, overdue_seconds)
-    cell = Plant(plant, workpieces=workpieces, seed=seed, disturbances=disturbances)
-    net = decomposition.net
-    with opened(decomposition, digest, journal_path, trace, simulated=(plant, workpieces, seed)) as files:
-        figures = figures_for(net, service)
+    cell = SimulatedCell(plant, workpieces, seed, speed, disturbances)
+    conduct = Conduct(
+        trace=trace,
+        journal_path=journal_path,
+        resume=resume,
+        said=said or {},
+        watch=watch,
+        overdue_seconds=overdue_seconds,
+        operator=operator,
+        service=service,
+        log=log,
+        tell=tell,
+    )
+    _check(cell, conduct, decomposition.net)
+    return _carry_through(decomposition, digest, cell, conduct)
+
+
+def run_simulated(bundle: Bundle, cell: SimulatedCell, conduct: Conduct = UNATTENDED) -> RunReport:
+    """Run a bundle on a simulated cell: `run`, with what it takes in two values."""
+    # A run that is refused has touched no file.
+    _check(cell, conduct, bundle.net, unproved(bundle))
+    return _carry_through(bundle.decomposition, bundle.digest, cell, conduct)
+
+
+def _carry_through(decomposition: Decomposition, digest: str, simulated: SimulatedCell, conduct: Conduct) -> RunReport:
+    plant, workpieces, seed = simulated.plant, simulated.workpieces, simulated.seed
+    cell = Plant(plant, workpieces=workpieces, seed=seed, disturbances=simulated.disturbances)
+    net, kept = decomposition.net, (plant, workpieces, seed)
+    with opened(decomposition, digest, conduct.journal_path, conduct.trace, simulated=kept) as files:
+        figures = figures_for(net, conduct.service)
         driver = SimulatedDriver(cell, net, files.cell)
         host = Host(
             decomposition,
             driver,
             files.recorder,
-            speed=1.0 if speed is None else speed,
-            overdue_seconds=overdue_seconds,
+            conduct,
+            speed=1.0 if simulated.speed is None else simulated.speed,
             is_complete=lambda: len(cell.delivered) == workpieces,
-            operator=operator,
             journal=files.journal,
-            resume=resume,
-            said=said,
             begin_seconds=files.begin_seconds,
-            monitor=None if watch is Watch.IGNORE else Monitor(net, plant),
-            stop_at_divergence=watch is Watch.STOP,
+            monitor=None if conduct.watch is Watch.IGNORE else Monitor(net, plant),
             figures=figures,
-            log=log,
-            tell=tell,
             latched=driver.latched,
         )
         if files.is_taken_up:
             host.unwatch()
-        situation = run_to_the_end(host, service, figures, virtual=speed is None)
+        situation = run_to_the_end(host, figures, virtual=simulated.speed is None)
     delivered = tuple(workpiece.id for workpiece in cell.delivered)
     seen = Counter((*delivered, *cell.inside))
     return RunReport(
@@ -242,56 +256,36 @@ def execute(
 
 
 def run_bound(
-    bundle: Bundle,
-    binding: Binding,
-    *,
-    trace_path: Path | str | None = None,
-    overdue_seconds: float = 120.0,
-    operator: Operator | None = None,
-    tell: Callable[[str, str], None] | None = None,
-    journal_path: Path | str | None = None,
-    resume: bool = False,
-    said: Mapping[str, Answer] | None = None,
-    plant: PlantModel | None = None,
-    watch: Watch = Watch.TELL,
-    service: Service | None = None,
-    log: Log | None = None,
+    bundle: Bundle, binding: Binding, conduct: Conduct = UNATTENDED, *, plant: PlantModel | None = None
 ) -> RunReport:
     """Run a bundle on the machines of a binding, in real time, until the operator stops it or nothing can go on.
 
-    What workpieces there are is not to be known; the report counts none. `tell` is told of links that come and go, by
-    device and sentence; journal, `resume` and `said` are as for `run`, and so are `watch`, where a `plant` says what
-    the machines do, `service` and `log`. Raises `InputError` F5002 where the bundle is
-    not proved, F5101 where the binding does not fit it, both before anything is connected; F1017 where the trace cannot
-    be written, and F5031 to F5034 where the journal cannot be gone on with.
+    What workpieces there are is not to be known; the report counts none. Told, too, is of links that come and go, by
+    device and sentence; the machines are watched where a `plant` says what they do. Raises `InputError` F5002 where the
+    bundle is not proved, F5101 where the binding does not fit it, both before anything is connected; F1017 where the
+    trace cannot be written, and F5031 to F5034 where the journal cannot be gone on with.
     """
     if problems := (*unproved(bundle), *(misfits(plant, bundle.net) if plant is not None else ())):
         raise InputError(problems)
     driver = bound_driver(binding, bundle.net)
     decomposition = bundle.decomposition
-    with opened(decomposition, bundle.digest, journal_path, trace_path) as files:
-        figures = figures_for(decomposition.net, service)
+    with opened(decomposition, bundle.digest, conduct.journal_path, conduct.trace) as files:
+        figures = figures_for(decomposition.net, conduct.service)
         host = Host(
             decomposition,
             driver,
             files.recorder,
-            overdue_seconds=overdue_seconds,
+            conduct,
             patience=patience_with(driver),
-            operator=operator,
-            tell=tell,
             journal=files.journal,
-            resume=resume,
-            said=said,
             begin_seconds=files.begin_seconds,
-            monitor=None if plant is None or watch is Watch.IGNORE else Monitor(decomposition.net, plant),
-            stop_at_divergence=watch is Watch.STOP,
+            monitor=None if plant is None or conduct.watch is Watch.IGNORE else Monitor(decomposition.net, plant),
             figures=figures,
-            log=log,
             latched=lambda: bound_driver(binding, bundle.net, latched=True),
         )
         if files.is_taken_up:
             host.unwatch()
-        situation = run_to_the_end(host, service, figures)
+        situation = run_to_the_end(host, figures)
         recorder = files.recorder
     return RunReport(
         situation,
@@ -319,15 +313,8 @@ def _decided(decomposition: Decomposition, firings: Mapping[str, int]) -> dict[s
     return {name: of_each[name] for name in (layers.root, *layers.coordinators()) if name in of_each}
 
 
-def _check(
-    plant: PlantModel,
-    net: Net,
-    workpieces: int,
-    speed: float | None,
-    overdue_seconds: float,
-    problems: Sequence[Diagnostic] = (),
-) -> None:
-    if workpieces < 0 or overdue_seconds <= 0 or (speed is not None and speed <= 0):
+def _check(cell: SimulatedCell, conduct: Conduct, net: Net, problems: Sequence[Diagnostic] = ()) -> None:
+    if cell.workpieces < 0 or conduct.overdue_seconds <= 0 or (cell.speed is not None and cell.speed <= 0):
         raise ValueError("workpieces must not be negative, times and speed must be positive")
-    if problems or (problems := misfits(plant, net)):
+    if problems or (problems := misfits(cell.plant, net)):
         raise InputError(problems)

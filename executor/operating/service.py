@@ -62,13 +62,12 @@ def patience_with(driver: Driver) -> Patience:
     return Patience(STOP_SECONDS + own)
 
 
-def run_to_the_end(
-    host: Host, service: Service | None = None, figures: Metrics | None = None, *, virtual: bool = False
-) -> Situation:
+def run_to_the_end(host: Host, figures: Metrics | None, *, virtual: bool = False) -> Situation:
     """Run a host on an event loop of its own; Ctrl-C or a request to terminate ends it in order."""
     if virtual:
         situation: Situation = run_in_virtual_time(terminable(host))
         return situation
+    service = host.conduct.service
     if service is None or figures is None:
         work = terminable(host)
     else:

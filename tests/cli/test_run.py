@@ -22,7 +22,7 @@ from firable.executor import RunReport, execute
 from firable.executor.cell.disturbances import NeverCompletes
 from firable.executor.drivers import binding
 from firable.executor.operating import running
-from firable.executor.operating.running import Watch
+from firable.executor.operating.conduct import Conduct, Watch
 from firable.executor.operating.situation import Situation, State
 from firable.nets.bundle import read_bundle
 from firable.nets.catalogue import catalogue_net, catalogue_path
@@ -394,20 +394,7 @@ def test_the_report_of_machines_that_are_not_as_they_are_modelled_is_as_its_sche
     )
     monkeypatch.setattr(running, "run_bound", lambda *_, **__: ended)
     monkeypatch.setattr(binding, "read_binding", lambda _: None)
-    report = run_bound_of(
-        bundle,
-        read_bundle(bundle),
-        "b",
-        None,
-        None,
-        None,
-        {},
-        resume=False,
-        plant=None,
-        watch=Watch.STOP,
-        service=None,
-        log=None,
-    ).to_json()
+    report = run_bound_of(bundle, read_bundle(bundle), "b", Conduct(watch=Watch.STOP), None).to_json()
     schema = json.loads(files("firable.cli").joinpath("report.schema.json").read_text(encoding="utf-8"))
     bound = {
         **schema,

@@ -13,6 +13,7 @@ from firable.cli import stepping
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.driver import Answer, Latched
 from firable.executor.drivers.dry_run import DryRunDriver
+from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.restart import uncertain
@@ -80,7 +81,7 @@ def run(monkeypatch: pytest.MonkeyPatch, *acts: Act) -> tuple[Situation, list[tu
 
     recorder = Recorder(NET, net_digest(NET), stream)
     with stepping.stepping(1.0, to_stderr=False) as operator:
-        host = Host(DECOMPOSITION, driver(), recorder, operator=operator, latched=driver)
+        host = Host(DECOMPOSITION, driver(), recorder, Conduct(operator=operator), latched=driver)
         terminal = Terminal(host, acts)
         monkeypatch.setattr(stepping, "_TypedMeanwhile", lambda _: terminal)
         situation = run_in_virtual_time(host.main())

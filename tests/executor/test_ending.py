@@ -19,6 +19,7 @@ from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.driver import Answer, Clock, Listener
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import Journal, MemoryJournal
+from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.ending import with_failed
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
@@ -86,10 +87,8 @@ def run_of(journal: Journal, *, overdue_seconds: float = 120.0, resume: bool = F
             decomposition,
             machine,
             recorder,
+            Conduct(operator=present, overdue_seconds=overdue_seconds, resume=resume),
             journal=journal,
-            operator=present,
-            overdue_seconds=overdue_seconds,
-            resume=resume,
         ),
         machine,
     )

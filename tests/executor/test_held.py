@@ -15,6 +15,7 @@ from firable.executor.drivers import kinds
 from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.bound import bound_driver
 from firable.executor.journal.journal import Journal, MemoryJournal
+from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import KEY, TRACE, Recorder
 from firable.executor.operating.situation import State
@@ -52,7 +53,9 @@ def installed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def host(journal: Journal, *, resume: bool = False) -> Host:
     recorder = Recorder(NET, net_digest(NET), io.StringIO(), journal.kept(TRACE).get(KEY))
-    return Host(split(NET), bound_driver(parse_binding(BINDING), NET), recorder, journal=journal, resume=resume)
+    return Host(
+        split(NET), bound_driver(parse_binding(BINDING), NET), recorder, Conduct(resume=resume), journal=journal
+    )
 
 
 async def interrupted(*ends: MemoryEnd) -> Journal:

@@ -16,6 +16,7 @@ from firable.executor.drivers.bench import until
 from firable.executor.drivers.bound import bound_driver
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import MemoryJournal
+from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import KEY, TRACE, Recorder
 from firable.executor.operating.restart import uncertain
@@ -35,9 +36,8 @@ async def executed(one: Served, operator: Callable[[Host], Awaitable[None]], sai
         DECOMPOSITION,
         driver,
         Recorder(NET, net_digest(NET), stream),
+        Conduct(operator=operator, tell=lambda kind, sentence: said.append(f"{kind}: {sentence}")),
         patience=patience_with(driver),
-        operator=operator,
-        tell=lambda kind, sentence: said.append(f"{kind}: {sentence}"),
         latched=partial(bound_driver, one.binding, NET, latched=True),
     )
     situation = await host.main()
@@ -230,8 +230,8 @@ def on(journal: MemoryJournal) -> Host:
         DECOMPOSITION,
         DryRunDriver(subnets, 0.01),
         Recorder(NET, net_digest(NET), None, kept),
+        Conduct(resume=True),
         journal=journal,
-        resume=True,
         latched=lambda: DryRunDriver(subnets, 0.01),
     )
 

@@ -14,6 +14,7 @@ from support.watched_runs import CELLS, run_of, slower
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.disturbances import Disturbance, NeverCompletes, StuckSensor
 from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.operating.conduct import Watch
 from firable.executor.operating.local_monitor import LocalMonitor
 from firable.executor.operating.monitor import Divergence
 from firable.nets.catalogue import catalogue_net, catalogue_plant
@@ -167,7 +168,7 @@ class WatchedCell(Cell):
         """Start a host with its monitor."""
         here = [name for name in machines if name]
         monitor = LocalMonitor(self.decomposition, here, catalogue_plant("one_robot"))
-        super().start(machines, shown, monitor=monitor, stop_at_divergence=self.stops, **options)
+        super().start(machines, shown, monitor=monitor, watch=Watch.STOP if self.stops else Watch.TELL, **options)
 
 
 class StoppingCell(WatchedCell):

@@ -13,9 +13,10 @@ from support.watched_runs import CELLS, run_of, slower
 
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.disturbances import NeverCompletes, StuckSensor
+from firable.executor.operating.conduct import Watch
 from firable.executor.operating.host import Host
 from firable.executor.operating.monitor import Divergence, Monitor, watch
-from firable.executor.operating.running import RunReport, Watch, execute
+from firable.executor.operating.running import RunReport, execute
 from firable.executor.operating.situation import State
 from firable.executor.protocol.commands import Answer
 from firable.nets.catalogue import catalogue_net, catalogue_plant

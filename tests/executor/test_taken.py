@@ -27,6 +27,7 @@ from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.links.in_process import Exchange, InProcessLink
 from firable.executor.links.link import COORDINATOR, Greeting
 from firable.executor.links.storages import Memory, Storage
+from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.dispatch import TAKEN
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import KEY, TRACE, Recorder
@@ -80,7 +81,7 @@ async def present(_: Host) -> None:
 
 def whole(driver: Queue, journal: Journal, *, resume: bool = False) -> Host:
     recorder = Recorder(NET, net_digest(NET), io.StringIO(), journal.kept(TRACE).get(KEY))
-    return Host(SPLIT, driver, recorder, journal=journal, operator=present, overdue_seconds=30, resume=resume)
+    return Host(SPLIT, driver, recorder, Conduct(operator=present, overdue_seconds=30, resume=resume), journal=journal)
 
 
 def among_others(driver: Queue, journal: Journal, *, resume: bool = False) -> Host:
@@ -89,7 +90,9 @@ def among_others(driver: Queue, journal: Journal, *, resume: bool = False) -> Ho
     another.listener = Heard(memory=Memory(Storage("of another host")))  # without another one nothing moves
     exchange.enter(another)
     link, recorder = InProcessLink(exchange, Greeting("d", ("a",))), Recorder(NET, "", None, None, ("a",))
-    return Host(SPLIT, driver, recorder, machines=("a",), link=link, journal=journal, overdue_seconds=30, resume=resume)
+    return Host(
+        SPLIT, driver, recorder, Conduct(overdue_seconds=30, resume=resume), machines=("a",), link=link, journal=journal
+    )
 
 
 Make = Callable[..., Host]
@@ -274,7 +277,7 @@ class Forgetting(DryRunDriver):
 def forgetful(net: Net, driver: Forgetting, journal: Journal, told: list[str]) -> Host:
     recorder = Recorder(net, net_digest(net), io.StringIO(), journal.kept(TRACE).get(KEY))
     tell = partial(lambda told, _, sentence: told.append(sentence), told)
-    return Host(split(net), driver, recorder, journal=journal, operator=present, resume=True, tell=tell)
+    return Host(split(net), driver, recorder, Conduct(operator=present, resume=True, tell=tell), journal=journal)
 
 
 @pytest.mark.parametrize("was_taken", [True, False])

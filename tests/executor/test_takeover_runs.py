@@ -17,6 +17,7 @@ from firable.executor.journal.journal import MemoryJournal, sync_now
 from firable.executor.journal.sqlite_journal import SqliteJournal, machines_of
 from firable.executor.journal.takeover import take_over
 from firable.executor.links.link import COORDINATOR
+from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.host import Host
 from firable.executor.operating.taken_up import opened
 from firable.executor.protocol.messages import Keep
@@ -73,9 +74,9 @@ def test_the_trace_of_a_run_that_has_taken_a_cell_over_begins_there_and_is_judge
                 read.decomposition,
                 driver,
                 files.recorder,
+                Conduct(resume=True),
                 journal=files.journal,
                 begin_seconds=files.begin_seconds,
-                resume=True,
             )
             ending = asyncio.create_task(run.main())
             await asyncio.sleep(3.5)

@@ -13,7 +13,10 @@ from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.links.in_process import Exchange, InProcessLink
 from firable.executor.links.link import COORDINATOR, Greeting, Link
+from firable.executor.operating.conduct import Conduct
+from firable.executor.operating.figures import Figures
 from firable.executor.operating.host import Host
+from firable.executor.operating.local_monitor import LocalMonitor
 from firable.executor.operating.recorder import KEY, TRACE, Recorder, TraceFile, size_bytes_of
 from firable.executor.operating.situation import Situation
 from firable.executor.operating.taken_up import start_of
@@ -67,7 +70,15 @@ class Cell:
         """The trace of a host."""
         return self.folder / f"{machines[0] or 'coordinator'}.trace"
 
-    def start(self, machines: tuple[str, ...], shown: Mapping[str, bool] | None = None, **options: Any) -> None:
+    def start(
+        self,
+        machines: tuple[str, ...],
+        shown: Mapping[str, bool] | None = None,
+        *,
+        monitor: LocalMonitor | None = None,
+        figures: Figures | None = None,
+        **conduct: Any,
+    ) -> None:
         """Start a host, or start it anew."""
         journal = self.journals[machines]
         kept = journal.kept(TRACE).get(KEY)
@@ -93,12 +104,13 @@ class Cell:
             self.decomposition,
             DryRunDriver(subnets, self.seconds, shown),
             recorder,
+            Conduct(tell=lambda kind, sentence: self.told.append((kind, sentence)), **conduct),
             machines=machines,
             link=link,
             journal=journal,
             begin_seconds=1e9 + now - recorder.began,
-            tell=lambda kind, sentence: self.told.append((kind, sentence)),
-            **options,
+            monitor=monitor,
+            figures=figures,
         )
         self.tasks[machines] = asyncio.create_task(host.main())
 

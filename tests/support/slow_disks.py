@@ -17,6 +17,7 @@ from firable.decompose.splitting.cut import split
 from firable.executor.drivers.bench import PATIENCE_S
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import MemoryJournal, Storing
+from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import KEY, TRACE, Recorder, TraceFile
 from firable.executor.operating.situation import Situation
@@ -132,7 +133,7 @@ class Rig:
             await asyncio.get_running_loop().create_future()
 
         recorder = Recorder(net, net_digest(net), trace or self.stream, self.journal.kept(TRACE).get(KEY))
-        self.host = Host(decomposition, self.machines, recorder, journal=self.journal, operator=present)
+        self.host = Host(decomposition, self.machines, recorder, Conduct(operator=present), journal=self.journal)
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[asyncio.Task[Situation]]:

@@ -5,7 +5,8 @@ from functools import cache
 
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.disturbances import Disturbance
-from firable.executor.operating.running import Watch, execute
+from firable.executor.operating.conduct import Watch
+from firable.executor.operating.running import execute
 from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.machines.plant_file import Move, PlantModel
 from firable.semantics.trace import Trace, parse_trace

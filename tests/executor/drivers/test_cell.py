@@ -21,6 +21,7 @@ from firable.executor.drivers.far_side.modbus_server import ModbusTcpEnd
 from firable.executor.drivers.far_side.mqtt_device import mosquitto
 from firable.executor.drivers.far_side.ports import free_port
 from firable.executor.drivers.modbus_points import address
+from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.service import patience_with
@@ -41,7 +42,9 @@ async def executed(one: Served, done: Callable[[], object], *, overdue_seconds: 
     recorder = Recorder(NET, net_digest(NET), stream)
     driver = bound_driver(one.binding, NET)
     patience = patience_with(driver)
-    host = Host(DECOMPOSITION, driver, recorder, operator=operator, overdue_seconds=overdue_seconds, patience=patience)
+    host = Host(
+        DECOMPOSITION, driver, recorder, Conduct(operator=operator, overdue_seconds=overdue_seconds), patience=patience
+    )
     situation = await host.main()
     assert replay(NET, parse_trace(stream.getvalue())).complete
     return situation
@@ -143,7 +146,9 @@ def test_a_situation_names_the_devices_that_cannot_be_reached_and_says_why() -> 
         host.stop()
 
     recorder = Recorder(NET, net_digest(NET), io.StringIO())
-    asyncio.run(Host(DECOMPOSITION, driver, recorder, operator=operator, patience=patience_with(driver)).main())
+    asyncio.run(
+        Host(DECOMPOSITION, driver, recorder, Conduct(operator=operator), patience=patience_with(driver)).main()
+    )
     assert "modbus is not connected: 127.0.0.1" in seen[0].message
     assert "serial is not connected: " in seen[0].message
 

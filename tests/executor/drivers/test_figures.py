@@ -12,6 +12,7 @@ from firable.executor.drivers import kinds
 from firable.executor.drivers.bench import until
 from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.bound import bound_driver
+from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.control import Endpoint
 from firable.executor.operating.host import Host
 from firable.executor.operating.metrics import Metrics
@@ -97,8 +98,7 @@ def test_a_signal_that_its_device_never_shows_is_told_with_its_point(monkeypatch
             split(NET),
             driver,
             Recorder(NET, net_digest(NET), None),
-            operator=lambda _: asyncio.sleep(60),
-            tell=lambda _, sentence: told.append(sentence),
+            Conduct(operator=lambda _: asyncio.sleep(60), tell=lambda _, sentence: told.append(sentence)),
         )
         ending = asyncio.create_task(host.main())
         sentence = "near: has never shown 'a.key' (at ky): are the points written as the device has them?"
@@ -148,8 +148,7 @@ commands: {a.lit: {device: near, channel: lamp}}
             split(net),
             driver,
             Recorder(net, net_digest(net), None),
-            operator=lambda _: asyncio.sleep(60),
-            tell=lambda _, sentence: told.append(sentence),
+            Conduct(operator=lambda _: asyncio.sleep(60), tell=lambda _, sentence: told.append(sentence)),
         )
         ending = asyncio.create_task(host.main())
         sentence = (

@@ -12,6 +12,7 @@ from firable.executor.drivers.bench import until
 from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.bound import BoundDriver, bound_driver
 from firable.executor.drivers.device import Point, Value
+from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.nets.interchange import net_digest
@@ -62,9 +63,11 @@ def host_of(driver: BoundDriver, told: list[str], overdue_seconds: float = 120.0
         split(NET),
         driver,
         Recorder(NET, net_digest(NET), None),
-        operator=lambda _: asyncio.sleep(60),
-        tell=lambda _, sentence: told.append(sentence),
-        overdue_seconds=overdue_seconds,
+        Conduct(
+            operator=lambda _: asyncio.sleep(60),
+            tell=lambda _, sentence: told.append(sentence),
+            overdue_seconds=overdue_seconds,
+        ),
     )
 
 
