@@ -127,30 +127,10 @@ def run(
     """
     refuse_a_net(bundle, "what runs is a bundle", "firable run")
     options = HostOptions(**host)
-    if not options.is_one_of_several:
-        options.refuse_alone()
-    for name, is_said in (("--say", say), ("--resume", options.resume)):
-        if is_said and options.journal is None:
-            raise click.UsageError(f"{name} is of a run that is taken up: name its --journal")
-
     served = ServeOptions(serve, token_file, serve_tls, operators, open_)
     if open_ and not is_given("speed"):
         speed = "1"
-    is_simulated = options.is_simulated
-    if (serve is not None or open_) and _SPEEDS[speed] is None and is_simulated:
-        raise click.UsageError(
-            "in virtual time a run is over before anybody acts: with --serve or --open, name --speed 1 or 10"
-        )
-    for name in () if is_simulated else ("workpieces", "seed", "speed"):
-        if is_given(name):
-            raise click.UsageError(f"--{name} is of the simulated cell, which this run has not (--bind, --controller)")
-    if options.is_one_of_several and step:
-        raise click.UsageError("--step is of a whole run: on one host of several, `firable operate` steps (--serve)")
-    is_watched = watch == "stop" or (watch == "tell" and is_given("watch"))
-    if options.is_one_of_several and (plant is not None or is_watched) and options.bind is None:
-        raise click.UsageError("--plant and --watch are of machines: say with --bind where those of this host are")
-    if is_watched and plant is None and not is_simulated:
-        raise click.UsageError(f"--watch {watch} holds the machines against a plant file: say with --plant which")
+    _refuse_combinations(options, served, say=say, speed=speed, step=step, plant=plant, watch=watch)
 
     def make() -> Report:
         from firable.cli.loop import read_machines
@@ -161,7 +141,7 @@ def run(
 
         _demand_a_file(trace)
         loaded = load(bundle, trust)
-        cell = plant_for(bundle, loaded.net.name) if plant is None and is_simulated else plant
+        cell = plant_for(bundle, loaded.net.name) if plant is None and options.is_simulated else plant
         model = None if cell is None else read_machines(cell)
         service = served.service(bundle, model)
         pace = 1.0 if options.bind is not None else _SPEEDS[speed]
@@ -190,6 +170,38 @@ def run(
         return replace(report, files=(trace,) if trace else ())
 
     return answer("run", format_, make, _show)
+
+
+def _refuse_combinations(
+    options: HostOptions,
+    served: ServeOptions,
+    *,
+    say: tuple[str, ...],
+    speed: str,
+    step: bool,
+    plant: str | None,
+    watch: str,
+) -> None:
+    """Refuse options that do not go together, before any file is read."""
+    if not options.is_one_of_several:
+        options.refuse_alone()
+    for name, is_said in (("--say", say), ("--resume", options.resume)):
+        if is_said and options.journal is None:
+            raise click.UsageError(f"{name} is of a run that is taken up: name its --journal")
+    if (served.serve is not None or served.open) and _SPEEDS[speed] is None and options.is_simulated:
+        raise click.UsageError(
+            "in virtual time a run is over before anybody acts: with --serve or --open, name --speed 1 or 10"
+        )
+    for name in () if options.is_simulated else ("workpieces", "seed", "speed"):
+        if is_given(name):
+            raise click.UsageError(f"--{name} is of the simulated cell, which this run has not (--bind, --controller)")
+    if options.is_one_of_several and step:
+        raise click.UsageError("--step is of a whole run: on one host of several, `firable operate` steps (--serve)")
+    is_watched = watch == "stop" or (watch == "tell" and is_given("watch"))
+    if options.is_one_of_several and (plant is not None or is_watched) and options.bind is None:
+        raise click.UsageError("--plant and --watch are of machines: say with --bind where those of this host are")
+    if is_watched and plant is None and not options.is_simulated:
+        raise click.UsageError(f"--watch {watch} holds the machines against a plant file: say with --plant which")
 
 
 def _run_simulated_of(path: str, bundle: Bundle, cell: SimulatedCell, conduct: Conduct) -> Report:
