@@ -1,10 +1,9 @@
-"""`firable run`: run a bundle on the simulated cell."""
+"""`firable run`: run a bundle on the simulated cell, on real machines, or on one host of several."""
 
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,22 +13,16 @@ from firable.cli.bound_run import run_bound_of, show_bound
 from firable.cli.choice import OneOf
 from firable.cli.files import READ, WRITTEN
 from firable.cli.hosting import HostOptions, host_options, run_host_of, show_host
-from firable.cli.log import log_option, log_to, told_aside
+from firable.cli.log import log_option, log_to
 from firable.cli.operate import ServeOptions, serve_options
 from firable.cli.options import answer, format_option, is_given, plant_for, refuse_a_net
 from firable.cli.report import Report
 from firable.cli.sign import trust_option
-from firable.cli.watched import machines_verdict, show_coalesced
+from firable.cli.simulated_run import run_simulated_of, show_simulated
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from firable.executor import Answer, Operator, RunReport
-    from firable.executor.operating.conduct import Conduct
-    from firable.executor.operating.running import SimulatedCell
-    from firable.nets.bundle import Bundle
+    from firable.executor import Answer, Operator
     from firable.nets.net import Net
-    from firable.nets.verdict import Verdict
 
 _SPEEDS = {"max": None, "1": 1.0, "10": 10.0}
 
@@ -166,7 +159,7 @@ def run(
             else:
                 assert model is not None, "a simulated cell is made of its plant"
                 simulated = SimulatedCell(model, workpieces, seed, _SPEEDS[speed])
-                report = _run_simulated_of(bundle, loaded, simulated, conduct)
+                report = run_simulated_of(bundle, loaded, simulated, conduct)
         return replace(report, files=(trace,) if trace else ())
 
     return answer("run", format_, make, _show)
@@ -204,40 +197,6 @@ def _refuse_combinations(
         raise click.UsageError(f"--watch {watch} holds the machines against a plant file: say with --plant which")
 
 
-def _run_simulated_of(path: str, bundle: Bundle, cell: SimulatedCell, conduct: Conduct) -> Report:
-    """Run until the workpieces have gone through, or nothing can go on, and report how it ended."""
-    from firable.executor.operating.running import run_simulated
-
-    with told_aside(_told, conduct.log) as tell:
-        report = run_simulated(bundle, cell, replace(conduct, tell=partial(_if_not_reported, tell)))
-    return Report(
-        "run",
-        path,
-        bundle.net,
-        _verdicts(report, cell.workpieces, cell.seed),
-        run={**report.to_json(), "workpieces": cell.workpieces, "seed": cell.seed},
-    )
-
-
-def _told(_kind: str, sentence: str) -> None:
-    """One line of what happens, as it happens."""
-    click.echo(f"  {sentence}", err=True)
-
-
-def _if_not_reported(tell: Callable[[str, str], None], kind: str, sentence: str) -> None:
-    """Tell what the report does not: a word of no use, an emergency stop that can be reset, a disk that hangs, that the
-    machines are not watched, an error that nobody has handled.
-    """
-    from firable.executor.operating.disk_watch import ANSWERS, HANGS
-    from firable.executor.operating.latch import LATCHED
-    from firable.executor.operating.log import UNHANDLED
-    from firable.executor.operating.restart import UNASKED
-    from firable.executor.operating.watching import UNWATCHED
-
-    if kind in {UNASKED, LATCHED, HANGS, ANSWERS, UNWATCHED, UNHANDLED}:
-        tell(kind, sentence)
-
-
 def _said(net: Net, say: tuple[str, ...]) -> dict[str, Answer]:
     """What the operator says of commands, by place."""
     from firable.executor.protocol.commands import SAID
@@ -267,81 +226,12 @@ def _demand_a_file(trace: str | None) -> None:
         raise InputError([Diagnostic("F1017", message, "name a file; one that is called so is ./-")])
 
 
-def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, ...]:
-    from firable.executor import State
-    from firable.nets.verdict import Status, Verdict
-
-    method = f"run on the simulated cell, seed {seed}"
-    through = len(report.delivered)
-    unsettled, all_through = report.situation.is_unsettled, through == workpieces
-    ended = {State.DONE: Status.PROVED, State.STOPPED: Status.UNKNOWN, State.HELD: Status.UNKNOWN}.get(
-        report.state, Status.VIOLATED
-    )
-    if report.state is State.STOPPED and all_through and not unsettled:
-        ended = Status.PROVED
-    reached = report.situation.message if all_through else f"{through} went through"
-    intact = not report.lost and not report.doubled
-    verdicts = [
-        Verdict(
-            "workpieces-carried-through",
-            ended,
-            f"{workpieces} workpieces go through the cell",
-            method,
-            bound=reached if ended is Status.UNKNOWN else "",
-            subjects=(*_why(report), *map(str, report.situation.blocked)) if ended is Status.VIOLATED else (),
-        ),
-        Verdict(
-            "workpieces-intact",
-            Status.PROVED if intact else Status.VIOLATED,
-            "no workpiece is lost, none doubled",
-            method,
-            subjects=tuple(f"workpiece {i}" for i in (*report.lost, *report.doubled)),
-        ),
-    ]
-    return (*verdicts, *machines_verdict(report, method))
-
-
-def _why(report: RunReport) -> Iterator[str]:
-    """Why the workpieces did not go through; what the verdict on the machines tells is not told twice."""
-    found, message = report.divergence, report.situation.message
-    if message:
-        yield message if found is None else message.replace(f": {found}", "; see machines-as-modelled")
-
-
 def _show(report: Report) -> None:
     for note in report.notes:
         text.show_diagnostic(note)
     if "machines" in report.run:
         show_host(report)
-        return
-    if "binding" in report.run:
+    elif "binding" in report.run:
         show_bound(report)
-        return
-    text.heading(report.net, report.input)
-    done = report.run
-    click.echo(
-        f"  {done['state']} after {done['simulated_seconds']:,.0f} s in the cell: "
-        f"{text.counted(len(done['delivered']), 'workpiece')} carried through, {len(done['lost'])} lost, "
-        f"{len(done['doubled'])} doubled, {len(done['inside'])} still inside"
-    )
-    several = len(done["decided"]) > 1
-    between = f"between {'coordinators' if several else 'coordinator'} and controllers"
-    click.echo(
-        f"  {text.counted(sum(done['firings'].values()), 'firing')}, "
-        f"{text.counted(done['commands'], 'command')} issued, {text.counted(done['messages'], 'message')} {between}"
-    )
-    if several:
-        told = ", ".join(f"{count:,} by {name}" for name, count in done["decided"].items())
-        click.echo(f"  decided: {told}")
-    show_coalesced(done["coalesced"])
-    if done["state"] in {"stopped", "done"} and done["message"]:
-        click.echo(f"  {done['message']}")
-    refuted = [verdict for verdict in report.verdicts if not verdict.holds]
-    if refuted:
-        text.show_verdicts(report.net, refuted)
-    text.show_summary(report)
-    if done["state"] == "held":
-        for line in done["message"].split("; "):
-            click.echo(f"  {line}")
-    for file in report.files:
-        click.echo(f"  trace {file}")
+    else:
+        show_simulated(report)

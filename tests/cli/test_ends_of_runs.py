@@ -11,7 +11,7 @@ import pytest
 from support.waiting import PATIENCE_SECONDS, heard_in_time, until
 
 from firable.cli.main import main
-from firable.cli.run import _verdicts
+from firable.cli.simulated_run import _verdicts
 from firable.executor import RunReport
 from firable.executor.operating.situation import Situation, State
 from firable.nets.verdict import Status

@@ -17,7 +17,7 @@ from support.waiting import PATIENCE_SECONDS, heard_in_time, until
 from firable.cli import bound_run, hosting
 from firable.cli.bound_run import run_bound_of
 from firable.cli.main import main
-from firable.cli.run import _verdicts
+from firable.cli.simulated_run import _verdicts
 from firable.executor import RunReport, execute
 from firable.executor.cell.disturbances import NeverCompletes
 from firable.executor.drivers import binding
