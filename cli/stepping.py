@@ -124,7 +124,7 @@ def stepping(speed: float | None, *, to_stderr: bool) -> Iterator[Operator]:
     """
     echo = partial(click.echo, err=to_stderr)
     if speed is None:
-        yield _operator(speed, echo)
+        yield lambda host: _Person(host, echo, is_virtual=True).operate()
         return
     with aside(echo) as say:
 
@@ -135,107 +135,141 @@ def stepping(speed: float | None, *, to_stderr: bool) -> Iterator[Operator]:
                 if error.errors:
                     raise error.errors[0] from None
 
-        yield _operator(speed, said)
+        yield lambda host: _Person(host, said, is_virtual=False).operate()
 
 
-def _operator(speed: float | None, say: Say) -> Operator:
+class _Person:
+    """Who steps a run at the terminal."""
 
-    async def key(typed: _Typed, prompt: str, keys: Collection[str], is_moot: Callable[[], bool]) -> str | None:
+    def __init__(self, host: Host, say: Say, *, is_virtual: bool) -> None:
+        self.host = host
+        self.say = say
+        self.is_virtual = is_virtual
+        self.typed: _Typed = (_TypedAtPrompt if is_virtual else _TypedMeanwhile)(say)
+
+    async def operate(self) -> None:
+        """Step, until the run goes on to its end."""
+        host = self.host
+        if not await self._taken_up():
+            return
+        host.pause()
+        while await self._stepped():
+            match await self._key(_PROMPT, {"", "r", "e", "s"}, self._is_elsewhere):
+                case "s":
+                    host.stop()
+                    return
+                case "e":
+                    host.stop(at_end_of_cycle=True)
+                    break
+                case "r" if not await self._paused_again():
+                    return
+                case None if self._is_held():
+                    if not await self._taken_up(was_stopped=True):
+                        return
+                    host.pause()
+                case None if not await self._paused_again():  # somebody else has resumed it
+                    return
+        host.resume()
+
+    async def _key(self, prompt: str, keys: Collection[str], is_moot: Callable[[], bool]) -> str | None:
         """One of the keys; None where the question is moot."""
         while True:
             try:
-                line = await typed.asked(prompt, is_moot)
+                line = await self.typed.asked(prompt, is_moot)
             except _MootError:
                 return None
             if line is None:
-                say()
+                self.say()
                 return "s"
             if line.strip().lower() in keys:
                 return line.strip().lower()
 
-    def is_held(host: Host) -> bool:
+    def _is_held(self) -> bool:
         """Whether there was an emergency stop, or a restart, and nobody has taken the run up since."""
-        return host.emergency is not None or host.taking_up is not None
+        return self.host.emergency is not None or self.host.taking_up is not None
 
-    def is_elsewhere(host: Host) -> bool:
+    def _is_elsewhere(self) -> bool:
         """Whether a run that was paused here is so no more."""
-        return is_held(host) or not host.paused
+        return self._is_held() or not self.host.paused
 
-    async def stepped(host: Host) -> bool:
+    async def _stepped(self) -> bool:
         """Fire one transition, waiting until one is enabled or the cell is stopped; False where none ever will be."""
+        host = self.host
         while (fired := await host.step()) is None:
-            if is_elsewhere(host):
+            if self._is_elsewhere():
                 return True
             if host.at_rest:
                 return False
             await asyncio.sleep(_POLL_SECONDS)
         description = host.net.transition(fired).description
-        say(f"{host.now_seconds():8.1f} s  {fired}  {description}")
+        self.say(f"{host.now_seconds():8.1f} s  {fired}  {description}")
         return True
 
-    async def paused_again(host: Host, typed: _Typed) -> bool:
+    async def _paused_again(self) -> bool:
         """Let the run go on until it is paused, by something that is typed; False where it goes on to its end."""
+        host = self.host
         host.resume()
-        if speed is None:
+        if self.is_virtual:
             return False
-        say("  running on; Enter pauses")
-        while not is_held(host) and not host.paused:
+        self.say("  running on; Enter pauses")
+        while not self._is_held() and not host.paused:
             if host.at_rest:
                 return False
-            if typed.unasked():
+            if self.typed.unasked():
                 host.pause()
             await asyncio.sleep(_POLL_SECONDS)
         return True
 
-    async def taken_up(host: Host, typed: _Typed, *, was_stopped: bool = False) -> bool:
+    async def _taken_up(self, *, was_stopped: bool = False) -> bool:
         """After a restart, or an emergency stop and its reset: say what became of the commands, and go on if wanted."""
-        while is_held(host):
+        host = self.host
+        while self._is_held():
             if host.latch is not None:
                 was_stopped = True
-                await reset(host, typed)
+                await self._reset()
             elif (found := host.taking_up) is None or not found.is_final:
                 await asyncio.sleep(_POLL_SECONDS)
             else:
                 if was_stopped:  # nothing that was typed before this stands there takes the run up
-                    forget(typed)
+                    self._forget()
                     was_stopped = False
                 for line in host.situation().message.split("; "):
-                    say(f"  {line}")
-                await (said(host, typed) if uncertain(host) else resumed(host, typed))
+                    self.say(f"  {line}")
+                await (self._said() if uncertain(host) else self._resumed())
             if host.is_to_end:
                 return False
         return True
 
-    def forget(typed: _Typed) -> None:
+    def _forget(self) -> None:
         """Take what was typed before it was asked for as said to nothing."""
-        while typed.unasked():
+        while self.typed.unasked():
             pass
 
-    async def reset(host: Host, typed: _Typed) -> None:
+    async def _reset(self) -> None:
         """Reset an emergency stop, or end the run."""
-        latch = host.latch
-        forget(typed)
-        match await key(typed, _RESET, {"reset", "s"}, lambda: host.latch is not latch):
+        host, latch = self.host, self.host.latch
+        self._forget()
+        match await self._key(_RESET, {"reset", "s"}, lambda: host.latch is not latch):
             case "s":
                 host.stop()
             case "reset":
                 for why in host.reset():
-                    say(f"  not reset: {why}")
+                    self.say(f"  not reset: {why}")
 
-    async def resumed(host: Host, typed: _Typed) -> None:
+    async def _resumed(self) -> None:
         """Take a run up that is held, or end it."""
-        found = host.taking_up
-        match await key(typed, _TAKE_UP, {"r", "s"}, lambda: host.taking_up is not found):
+        host, found = self.host, self.host.taking_up
+        match await self._key(_TAKE_UP, {"r", "s"}, lambda: host.taking_up is not found):
             case "s":
                 host.stop()
             case "r":
                 host.resume()
 
-    async def said(host: Host, typed: _Typed) -> None:
+    async def _said(self) -> None:
         """Say what became of a command that no machine can tell of, or end the run."""
-        found = host.taking_up
+        host, found = self.host, self.host.taking_up
         try:
-            line = await typed.asked(_SAY, lambda: host.taking_up is not found or not uncertain(host))
+            line = await self.typed.asked(_SAY, lambda: host.taking_up is not found or not uncertain(host))
         except _MootError:
             return
         if line is None or line.strip().lower() == "s":
@@ -244,28 +278,3 @@ def _operator(speed: float | None, say: Say) -> Operator:
         place, _, word = line.strip().partition("=")
         if word in SAID:  # or it is asked again
             host.say(place, SAID[word])
-
-    async def operate(host: Host) -> None:
-        typed: _Typed = (_TypedAtPrompt if speed is None else _TypedMeanwhile)(say)
-        if not await taken_up(host, typed):
-            return
-        host.pause()
-        while await stepped(host):
-            match await key(typed, _PROMPT, {"", "r", "e", "s"}, lambda: is_elsewhere(host)):
-                case "s":
-                    host.stop()
-                    return
-                case "e":
-                    host.stop(at_end_of_cycle=True)
-                    break
-                case "r" if not await paused_again(host, typed):
-                    return
-                case None if is_held(host):
-                    if not await taken_up(host, typed, was_stopped=True):
-                        return
-                    host.pause()
-                case None if not await paused_again(host, typed):  # somebody else has resumed it
-                    return
-        host.resume()
-
-    return operate
