@@ -27,6 +27,7 @@ Rejected: regions and integer programs, which find monitors with weights; a plac
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations, islice, product, takewhile
 from typing import Any, Final, Generic
@@ -62,6 +63,7 @@ _ENTRIES_MAX: Final = 6  # transitions that enter a zone, each of which is to be
 _GATES_MAX: Final = 8  # for one such transition
 _GIVERS_MAX: Final = 3
 _ALIKE_MAX: Final = 8  # changes of one size that are compared
+_CURED_WARNINGS: Final = frozenset({"effective-conflicts"})
 
 _Changes = tuple[Change, ...]
 
@@ -78,9 +80,11 @@ def explained(report: CheckReport, queries: Sequence[Query] = ()) -> tuple[Verdi
         return told
     try:
         search = _Search(space, {verdict.name: verdict for verdict in told}, queries)
-        return tuple(replace(verdict, cures=search.cures(verdict)) for verdict in told)
     except BudgetExceeded:
         return told
+    for verdict in told:
+        search.look(verdict)
+    return tuple(replace(verdict, cures=search.cures(verdict)) for verdict in told)
 
 
 def with_circle(net: Net, verdict: Verdict) -> Verdict:
@@ -130,28 +134,30 @@ class _Search(Generic[S]):
         self._making = _AS_MANY_MARKINGS * len(self._net.transitions)
         self._explored = self._checked = self._checked_nets = self._searches = 0
         self._after: dict[_Changes, CheckReport | None] = {}
-        self._found: list[tuple[_Cured, ...]] = []
+        self._found: list[_Cured] = []
 
-    def cures(self, verdict: Verdict) -> tuple[Cure, ...]:
-        """The best change of each kind that cures a verdict; those of an earlier verdict, where they do."""
-        if verdict.status is not Status.VIOLATED or verdict.weight is Weight.INFORMATION:
-            return ()
-        if verdict.weight is Weight.WARNING and verdict.name != "effective-conflicts":
-            return ()
-        for earlier in self._found:
-            if shared := [one for one in earlier if verdict.name in one.proves]:
-                return tuple(one.told(verdict.name) for one in shared)
-        if self._searches == _SEARCHES_MAX:
-            return ()
+    def look(self, verdict: Verdict) -> None:
+        """Look for changes that cure a verdict, unless one is found that does."""
+        if not _is_to_be_cured(verdict) or self._cured(verdict) or self._searches == _SEARCHES_MAX:
+            return
         self._searches += 1
         self._explored = self._checked = self._checked_nets = 0
-        found = (self._best(verdict.name, kind) for kind in self._kinds(verdict))
-        try:
-            cured = sorted((self._asked_again(one) for one in found if one is not None), key=_rank)
-        except BudgetExceeded:
+        with suppress(BudgetExceeded):  # what was found until then is kept
+            for kind in self._kinds(verdict):
+                if (best := self._best(verdict.name, kind)) is not None:
+                    self._found.append(self._asked_again(best))
+
+    def cures(self, verdict: Verdict) -> tuple[Cure, ...]:
+        """The best change of each kind that cures a verdict, among all that were found, for whichever verdict."""
+        if not _is_to_be_cured(verdict):
             return ()
-        self._found.append(tuple(cured))
-        return tuple(one.told(verdict.name) for one in cured)
+        best: dict[type[Change], _Cured] = {}
+        for one in sorted(self._cured(verdict), key=_rank):
+            best.setdefault(type(one.changes[0]), one)
+        return tuple(one.told(verdict.name) for one in best.values())
+
+    def _cured(self, verdict: Verdict) -> list[_Cured]:
+        return [one for one in self._found if verdict.name in one.proves]
 
     def _kinds(self, verdict: Verdict) -> Iterator[Iterator[_Changes]]:
         """The changes to try, in the order of their sizes: of each kind for itself."""
@@ -349,6 +355,12 @@ class _Search(Generic[S]):
     def _budget(self) -> Budget:
         """Room for a capacity place more, which at most doubles the markings, in the time that the report has."""
         return Budget(markings=2 * self._space.n_markings + 1, seconds=self._space.deadline.left_seconds)
+
+
+def _is_to_be_cured(verdict: Verdict) -> bool:
+    if verdict.status is not Status.VIOLATED:
+        return False
+    return verdict.weight is Weight.REQUIRED or (verdict.weight is Weight.WARNING and verdict.name in _CURED_WARNINGS)
 
 
 def _fired(space: StateSpace[Any]) -> set[int]:

@@ -55,6 +55,18 @@ def test_one_cure_is_told_of_all_verdicts_that_it_cures() -> None:
         assert all("deadlock-free" in cure.proves and name not in cure.proves for cure in found[name].cures)
 
 
+def test_a_cure_that_is_found_for_a_later_verdict_is_told_of_an_earlier_one() -> None:
+    """Of contact by itself none is found; the gate that cures the deadlock keeps the net from it as well."""
+    arcs = (("ec", "d"), ("b", "e"), ("c", "ad"), ("e", "b"), ("d", "b"), ("f", "a"))
+    transitions = tuple(Transition(f"t{t}", tuple(of), tuple(to)) for t, (of, to) in enumerate(arcs))
+    told = _explained(Net("late", tuple(Place(name, marked=name in "bc") for name in "abcdef"), transitions))
+    (cure,) = told["deadlock-free"].cures
+    assert cure.changes == ("give t4 the gate `unless: a`",)
+    assert "contact-free" in cure.proves
+    (same,) = told["contact-free"].cures
+    assert same.changes == cure.changes
+
+
 def test_a_cure_tells_what_becomes_of_the_queries_and_is_none_the_less_offered() -> None:
     texts = {"again": "EF deadlock", "ends": "AF deadlock", "never": "AG not deadlock"}
     net = catalogue_net("one_robot_mc_late")
