@@ -10,7 +10,7 @@ import click
 from firable.cli import text
 from firable.cli.log import told_aside
 from firable.cli.report import Report
-from firable.cli.watched import AFTER_A_FAULT, machines_verdict, show_coalesced
+from firable.cli.watched import AFTER_A_FAULT, machines_verdict, show_coalesced, since
 
 if TYPE_CHECKING:
     from firable.executor import PlantModel, RunReport
@@ -30,13 +30,14 @@ def run_bound_of(path: str, bundle: Bundle, bind: str, conduct: Conduct, plant: 
     with told_aside(_told, conduct.log) as tell:
         report = run_bound(bundle, read_binding(bind), replace(conduct, tell=tell), plant=plant)
     known = report.to_json()
-    kept = ("state", "message", "marking", "blocked", "firings", "commands", "messages", "coalesced", "divergence")
+    of_workpieces = {"delivered", "inside", "lost", "doubled", "decided", "simulated_seconds"}
+    kept = {key: value for key, value in known.items() if key not in of_workpieces}
     return Report(
         "run",
         path,
         bundle.net,
         (_verdict(report, bind), *machines_verdict(report, f"run on the machines of {bind}")),
-        run={**{key: known[key] for key in kept if key in known}, "seconds": report.simulated_seconds, "binding": bind},
+        run={**kept, "seconds": report.simulated_seconds, "binding": bind},
     )
 
 
@@ -53,7 +54,7 @@ def show_bound(report: Report) -> None:
     click.echo(
         f"  {text.counted(sum(done['firings'].values()), 'firing')}, "
         f"{text.counted(done['commands'], 'command')} issued, "
-        f"{text.counted(done['messages'], 'message')} between coordinator and controllers"
+        f"{text.counted(done['messages'], 'message')} between coordinator and controllers{since(done)}"
     )
     show_coalesced(done["coalesced"])
     if refuted := [verdict for verdict in report.verdicts if not verdict.holds]:

@@ -11,7 +11,7 @@ import click
 from firable.cli import text
 from firable.cli.log import told_aside
 from firable.cli.report import Report
-from firable.cli.watched import machines_verdict, show_coalesced
+from firable.cli.watched import machines_verdict, show_coalesced, since
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -52,6 +52,7 @@ def show_simulated(report: Report) -> None:
     click.echo(
         f"  {text.counted(sum(done['firings'].values()), 'firing')}, "
         f"{text.counted(done['commands'], 'command')} issued, {text.counted(done['messages'], 'message')} {between}"
+        f"{since(done)}"
     )
     if several:
         told = ", ".join(f"{count:,} by {name}" for name, count in done["decided"].items())

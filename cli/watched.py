@@ -1,8 +1,8 @@
-"""What `firable run` says of the machines: what they did, what came too fast, and what to do after a fault."""
+"""What `firable run` says of every run: of the machines, of what came too fast, since when, and after a fault."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -39,6 +39,11 @@ def machines_verdict(report: RunReport | HostReport, method: str) -> tuple[Verdi
         return (Verdict(name, Status.PROVED, statement, method),)
     hint = f"at {found.at_seconds:.2f} s: {found.message}; mend the plant file, or look at that machine"
     return (Verdict(name, Status.VIOLATED, statement, method, hint=hint, subjects=found.places),)
+
+
+def since(run: Mapping[str, Any]) -> str:
+    """From when on firings, commands and messages are counted, where a run was taken up."""
+    return f", since it was taken up at {run['begin_seconds']:,.0f} s" if run["begin_seconds"] else ""
 
 
 def show_coalesced(changes: Mapping[str, int]) -> None:

@@ -54,7 +54,10 @@ class SimulatedCell:
 
 @dataclass(frozen=True, slots=True)
 class RunReport:
-    """How a run ended: the workpieces by their identities, what was done for them, and the situation at the end."""
+    """How a run ended: the workpieces by their identities, what was done for them, and the situation at the end.
+
+    Firings, commands and messages are those since the run was begun or taken up; its trace has them all.
+    """
 
     situation: Situation
     delivered: tuple[int, ...]
@@ -74,6 +77,8 @@ class RunReport:
     """The first thing that they did and could not have done, or did not and must have."""
     coalesced: Mapping[str, int] = field(default_factory=dict)
     """For each signal how many of its changes came faster than they were read, and were told to nobody."""
+    begin_seconds: float = 0.0
+    """When it was taken up, in the time of the run; 0 where it was begun."""
 
     @property
     def state(self) -> State:
@@ -97,6 +102,7 @@ class RunReport:
             "decided": dict(self.decided),
             "coalesced": dict(self.coalesced),
             "simulated_seconds": self.simulated_seconds,
+            "begin_seconds": self.begin_seconds,
             **({} if self.divergence is None else {"divergence": self.divergence.to_json()}),
         }
 
@@ -252,6 +258,7 @@ def _carry_through(decomposition: Decomposition, digest: str, simulated: Simulat
         watched=host.is_watched,
         divergence=host.divergence,
         coalesced=host.coalesced.up_to_now(host.driver),
+        begin_seconds=files.begin_seconds,
     )
 
 
@@ -301,6 +308,7 @@ def run_bound(
         watched=host.is_watched,
         divergence=host.divergence,
         coalesced=host.coalesced.up_to_now(host.driver),
+        begin_seconds=files.begin_seconds,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import subprocess
 import sys
@@ -63,6 +64,7 @@ def test_a_run_on_machines_that_is_stopped_while_it_is_held_ends_as_one_that_som
         assert held.returncode == 3, said
         assert "'R WORK' of 'robot.working' was issued, and nobody knows what became of it" in said
         assert "--say robot.working=done" in said, "there is nobody left who is served"
+        assert re.search(r"  0 firings, .* since it was taken up at \d+ s\n", said)
     finally:
         for process in (running, held):
             if process is not None:

@@ -202,9 +202,14 @@ def test_reports_are_written_to_files_beside_what_is_printed(here: Path, capsys:
 
 
 def test_no_report_is_written_over_what_is_read(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for file in ("safe.firable.yaml", str(here / "nets/../safe.firable.yaml")):
+    (here / "report.json").symlink_to("safe.firable.yaml")
+    for file, why in (
+        ("safe.firable.yaml", "that is the name of a net file, which --write does not write"),
+        ("report.json", "would overwrite what the command reads"),
+        (str(here / "nets/../report.json"), "would overwrite what the command reads"),
+    ):
         assert main(["check", "safe.firable.yaml", "--write", "json", file]) == 2
-        assert "would overwrite what the command reads" in capsys.readouterr().err
+        assert why in capsys.readouterr().err
     assert (here / "safe.firable.yaml").read_text("utf-8") == SAFE
 
 

@@ -257,6 +257,7 @@ def test_a_run_that_was_killed_goes_on_by_the_operators_key(bundle: str, tmp_pat
     done = typed("r\nr\n", bundle, *options, "--step")
     assert done.returncode == 0, done.stdout + done.stderr
     assert "2 workpieces carried through, 0 lost, 0 doubled" in done.stdout
+    assert re.search(r" firings, .* controllers, since it was taken up at \d+ s\n", done.stdout)
     assert {"restarted", "taken up"} <= set(notes_of(tmp_path / "trace"))
 
 
