@@ -145,7 +145,7 @@ class CellLog:
         """The check value that the next line has."""
         return crc32(json.dumps(item).encode(), self.check)
 
-    def _refuse(self, why: str, hint: str = "run it as it was begun, or name another folder") -> NoReturn:
+    def _refuse(self, why: str, hint: str = "run it as it was begun, or name another journal") -> NoReturn:
         message = f"{printable(str(self.path))}: not the simulated cell of this run: {why}"
         raise InputError([Diagnostic("F5035", message, hint)]) from None
 

@@ -208,7 +208,7 @@ class SqliteJournal:
             message = f"{path}: the journal is of the bundle {str(its_digest)[:12]}, and this one is {digest[:12]}"
         else:
             message = f"{path}: the journal is of {printable(machines)}, and not of {', '.join(self.machines)}"
-        hint = "name another folder, or run the bundle that the journal belongs to"
+        hint = "name another journal, or run the bundle that the journal belongs to"
         raise InputError([Diagnostic("F5031", message, hint)])
 
 
@@ -251,7 +251,7 @@ def _failures(path: Path, done: str) -> Iterator[None]:
         name = getattr(error, "sqlite_errorname", "")
         if name.startswith(("SQLITE_BUSY", "SQLITE_LOCKED")):
             message = f"{shown}: the journal is in use by another process"
-            hint = "one process at a time runs these machines: stop that one first, or name another folder"
+            hint = "one process at a time runs these machines: stop that one first, or name another journal"
             raise InputError([Diagnostic("F5033", message, hint)]) from None
         if name.startswith(("SQLITE_CORRUPT", "SQLITE_NOTADB", "SQLITE_ERROR")) or not (
             name or isinstance(error, OSError)

@@ -210,7 +210,7 @@ error[F5025]: 'robot' came back without what was kept there: the journal is anot
         a_journal_that_is_open,
         """\
 error[F5033]: {folder}/cell.journal: the journal is in use by another process
-  hint: one process at a time runs these machines: stop that one first, or name another folder
+  hint: one process at a time runs these machines: stop that one first, or name another journal
 """,
     ),
     "F5061": (
