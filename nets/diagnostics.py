@@ -279,7 +279,7 @@ def unknown_name(
     name: str,
     known: Collection[str],
     subject: Subject,
-    hint: str = "Declare it first, or correct the name.",
+    hint: str = "declare it first, or correct the name",
 ) -> Diagnostic:
     """The diagnostic on a name that nothing has, with the known name that was probably meant."""
     owner, _, own = name.partition(".")

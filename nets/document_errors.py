@@ -172,7 +172,7 @@ def _problem(source: Source, tree: Node, shape: Shape, error: _Error, unknown: C
     found = list(nodes_along(tree, path))
     key, node = found[-1]
     if kind == "extra_forbidden":
-        hint = f"The keys here are {', '.join(known)}; check the indentation too"
+        hint = f"the keys here are {', '.join(known)}; check the indentation too"
         if isinstance(node, Scalar) and node.plain and not node.text and len(found) > 1:
             hint += ", and write a text with a comma in double quotes"
         return Diagnostic(

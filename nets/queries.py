@@ -221,7 +221,7 @@ class KnownNames:
     def _unknown(self, kind: str, name: str, known: Set[str]) -> Iterator[Diagnostic]:
         if name not in known and (kind, name) not in self._asked:
             self._asked.add((kind, name))
-            problem = unknown_in_formula(kind, name, self.net, (name,), f"A query names the {kind}s of the net.")
+            problem = unknown_in_formula(kind, name, self.net, (name,), f"a query names the {kind}s of the net")
             yield replace(problem, message=problem.message.replace(f"'{name}'", quoted(name)))
 
 

@@ -393,7 +393,7 @@ def _properties(net: Net) -> Iterator[Diagnostic]:
 
 
 def unknown_in_formula(
-    kind: str, name: str, net: Net, subject: Subject, hint: str = "Declare it first, or correct the name."
+    kind: str, name: str, net: Net, subject: Subject, hint: str = "declare it first, or correct the name"
 ) -> Diagnostic:
     """The diagnostic on a name in a formula that no place, or no transition, of the net has."""
     if kind == "place":

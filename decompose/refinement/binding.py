@@ -66,7 +66,7 @@ def bindings(net: Net, catalogue: Catalogue) -> dict[str, Binding]:
     controllers = [controller.name for controller in net.controllers]
     for place in net.places:
         if place.resource and (owner := place.resource.idle.partition(".")[0]) not in controllers:
-            hint = did_you_mean(owner, controllers) + f"Declare it: `{owner}:` under `controllers`."
+            hint = did_you_mean(owner, controllers) + f"declare it: `{owner}:` under `controllers`"
             message = f"'{place.name}' opens to '{place.resource.idle}', and there is no controller '{owner}'"
             problems.append(Diagnostic("F2005", message, hint, ("places", place.name, "opens", "to")))
     if not any(place.task for place in net.places):
@@ -153,7 +153,7 @@ def _problems_at_place(net: Net, place: Place, use: TaskUse, catalogue: Catalogu
             close = did_you_mean(name, [one.name.rpartition(".")[2] for one in net.places if one.resource])
             yield Diagnostic(
                 "F4011", f"'{name}', in the role '{role.name}' {where}, opens to no resource",
-                f"{close}Name a place that says `opens: {{to: CONTROLLER.PLACE, machine: NAME}}`.", at,
+                f"{close}name a place that says `opens: {{to: CONTROLLER.PLACE, machine: NAME}}`", at,
             )  # fmt: skip
             continue
         if (other := taken.setdefault(full, role.name)) != role.name:
@@ -180,7 +180,7 @@ def subtask_problems(task: Task, catalogue: Catalogue) -> Iterator[Diagnostic]:
         for role in inner.roles:
             name = given.get(role.name)
             if name is not None and name not in outer:
-                hint = did_you_mean(name, outer) + f"Name a role of '{task.name}'."
+                hint = did_you_mean(name, outer) + f"name a role of '{task.name}'"
                 yield Diagnostic("F4011", f"there is no role '{name}' for '{role.name}' {where}", hint, subject)
             elif name is not None and (other := taken.setdefault(name, role.name)) != role.name:
                 message = f"'{name}' is in two roles {where}, '{other}' and '{role.name}'"
@@ -194,7 +194,7 @@ def _arguments(use: TaskUse, task: Task, where: str, subject: Subject) -> Iterat
     known = [*roles, *parameters]
     for name in given:
         if name not in known:
-            hint = did_you_mean(name, known) + f"'{task.name}' has {', '.join(known)}."
+            hint = did_you_mean(name, known) + f"'{task.name}' has {', '.join(known)}"
             message = f"'{name}' {where} is neither a role nor a parameter of the task '{task.name}'"
             yield Diagnostic("F4011", message, hint, (*subject, name))
     needed = [*roles, *(name for name, default in task.parameters if default is None)]
@@ -259,5 +259,5 @@ def _cycle(task: Task, catalogue: Catalogue) -> list[str]:
 
 def _unknown(name: str, catalogue: Catalogue, where: str, subject: Subject) -> Diagnostic:
     known = sorted(catalogue)
-    hint = did_you_mean(name, known) + f"Registered are {', '.join(known)}; --tasks names a file with more."
+    hint = did_you_mean(name, known) + f"registered are {', '.join(known)}; --tasks names a file with more"
     return Diagnostic("F4010", f"the task '{name}' {where} is not registered", hint, subject)

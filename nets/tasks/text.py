@@ -347,9 +347,9 @@ class _Reading:
 
 _NAME_HINT: Final = "use letters, digits, '_' and '-'"
 _KNOWN_HINT: Final = {
-    "role": "Name a role of the task.",
-    "step": "Write `role.step`, or the name of a subtask.",
-    "step or sensor": "Write `role.step`, the name of a subtask, or `role.sensor` of the role's `inputs`.",
+    "role": "name a role of the task",
+    "step": "write `role.step`, or the name of a subtask",
+    "step or sensor": "write `role.step`, the name of a subtask, or `role.sensor` of the role's `inputs`",
 }
 
 
