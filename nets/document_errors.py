@@ -172,12 +172,15 @@ def _problem(source: Source, tree: Node, shape: Shape, error: _Error, unknown: C
     found = list(nodes_along(tree, path))
     key, node = found[-1]
     if kind == "extra_forbidden":
+        unknown_key = f"unknown key {quoted(str(path[-1]))}{_inside(path[:-1])}"
+        if inner := _of_an_inner_mapping(shape, error.path, known, owner=found[-2][1] if len(found) > 1 else tree):
+            return Diagnostic("F1008", unknown_key, inner, span=node_span(source, key or node))
         hint = f"the keys here are {', '.join(known)}; check the indentation too"
         if isinstance(node, Scalar) and node.plain and not node.text and len(found) > 1:
             hint += ", and write a text with a comma in double quotes"
         return Diagnostic(
             "F1008",
-            f"unknown key {quoted(str(path[-1]))}{_inside(path[:-1])}",
+            unknown_key,
             did_you_mean(str(path[-1]), known) + hint,
             span=node_span(source, key or node),
         )
@@ -205,6 +208,23 @@ def _problem(source: Source, tree: Node, shape: Shape, error: _Error, unknown: C
     return Diagnostic(
         "F1010", f"{_found(node)} stands{_where(path)}", _wanted(kind, context, node, path), span=node_span(source, at)
     )
+
+
+_FORMS: Final = {
+    "leads_to": "{from: a, to: b, fairness: strong}",
+    "within": "{time: 5s, to: late, timer: overdue}",
+    "send": "{machine: R, command: MOVE}",
+    "opens": "{to: CONTROLLER.PLACE, machine: R}",
+}
+
+
+def _of_an_inner_mapping(shape: Shape, path: Path, known: Collection[str], owner: Node) -> str:
+    """The hint on a key that stands one level too high: beside the mapping that it is a key of, or without that one."""
+    given = owner.entries if isinstance(owner, MappingNode) else {}
+    outer = [key for key in _FORMS if key in known and str(path[-1]) in shape.keys_at((*path[:-1], key))]
+    if len(outer) > 1:  # `machine`, of a command or of a resource: whichever is there
+        outer = [key for key in outer if key in given]
+    return f"'{path[-1]}' is a key of `{outer[0]}`: write `{outer[0]}: {_FORMS[outer[0]]}`" if outer else ""
 
 
 def _slip(node: Node, missing: str, known: Collection[str]) -> Scalar | None:
@@ -288,7 +308,7 @@ def _wanted(kind: str, context: Mapping[str, Any], node: Node, path: Path) -> st
     is_word = isinstance(node, Scalar) and node.plain and text in {"true", "false"}
     match kind:
         case "model_type" if path[-1:] == ("leads_to",):
-            return "two formulas are expected: `[p, q]`, or `from:` and `to:`"
+            return f"two formulas are expected: `[a, b]`, or `{_FORMS['leads_to']}`"
         case "model_type" if path[-1:] == ("within",):
             return "a time is expected, such as `5s`, or a mapping with `time: 5s`"
         case "nothing_given":
