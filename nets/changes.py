@@ -131,6 +131,15 @@ def capacity(net: Net, takers: Sequence[str], givers: Sequence[str]) -> Capacity
     return CapacityPlace(free_name(name, net.place_index), owner, tuple(takers), tuple(givers))
 
 
+def arbitration(among: Sequence[str], taken: Iterable[str]) -> Arbitration:
+    """An arbiter of these transitions under a name that none of `taken` is.
+
+    >>> print(arbitration(["left", "right"], ()))
+    add to `arbiters`: `left_or_right: {among: [left, right], by: priority}`
+    """
+    return Arbitration(Arbiter(free_name("_or_".join(among[:2]), taken), tuple(among)))
+
+
 def free_name(wanted: str, taken: Iterable[str]) -> str:
     """The name, or that with the first number from 2 on that nothing has.
 

@@ -152,12 +152,18 @@ def structural_conflicts(net: Net) -> tuple[Listed, Listed]:
 
 def jointly_openable(net: Net, transitions: Iterable[int]) -> bool:
     """Whether one valuation of the signals opens the external gates of all these transitions."""
-    wanted: dict[str, bool] = {}
+    return at_odds(net, transitions) is None
+
+
+def at_odds(net: Net, transitions: Iterable[int]) -> tuple[int, int, str] | None:
+    """Two of these transitions, and a signal that one of them wants 1 and the other one 0; None where there are none."""
+    wanted: dict[str, tuple[bool, int]] = {}
     for t in transitions:
         for gate in net.transitions[t].external:
-            if wanted.setdefault(gate.signal, gate.wanted) != gate.wanted:
-                return False
-    return True
+            value, by = wanted.setdefault(gate.signal, (gate.wanted, t))
+            if value != gate.wanted:
+                return by, t, gate.signal
+    return None
 
 
 def gate_races(net: Net, among: Iterable[int] | None = None) -> Iterator[tuple[int, int]]:

@@ -40,10 +40,10 @@ from firable.analysis.spaces.reachability import REASONS, Budget, explore
 from firable.analysis.spaces.space import S, StateSpace
 from firable.analysis.temporal.queries import answer
 from firable.analysis.verdicts.goals import goals_of
-from firable.nets.changes import Arbitration, Change, Gate, capacity, changed, free_name
+from firable.nets.changes import Change, Gate, arbitration, capacity, changed
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import Or
-from firable.nets.net import Arbiter, Net, Property, PropertyKind
+from firable.nets.net import Net, Property, PropertyKind
 from firable.nets.queries import Query
 from firable.nets.verdict import Cure, Status, Verdict, Weight
 from firable.semantics.conflict import conflicts
@@ -272,9 +272,9 @@ class _Search(Generic[S]):
         taken = {arbiter.name for arbiter in net.arbiters}
         changes: list[Change] = []
         for group in sorted(map(sorted, groups.values())):
-            among = tuple(net.transitions[t].name for t in group)
-            taken.add(name := free_name("_or_".join(among[:2]), taken))
-            changes.append(Arbitration(Arbiter(name, among)))
+            added = arbitration([net.transitions[t].name for t in group], taken)
+            taken.add(added.arbiter.name)
+            changes.append(added)
         if changes:
             yield tuple(changes)
 

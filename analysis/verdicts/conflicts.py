@@ -14,7 +14,7 @@ a step that cannot be serialised, because the net then means two things, one for
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final, Generic
@@ -23,6 +23,7 @@ from firable.analysis._engine import BudgetExceeded, IncompleteGraph
 from firable.analysis.question import Answer, Question, listed, no, unknown, yes
 from firable.analysis.spaces.reachability import ReachabilityGraph
 from firable.analysis.spaces.space import S, StateSpace
+from firable.nets.changes import arbitration
 from firable.nets.net import Net
 from firable.nets.verdict import Verdict, Weight
 from firable.semantics.conflict import (
@@ -257,14 +258,25 @@ def effective_conflict_free(analysis: ConflictAnalysis[Any]) -> Verdict:
             return unknown(_NONE_OF_THE_FIRST, _ONE_BY_ONE, "F3004") if analysis.structural.more else yes()
         hint = _ONLY_THE_FIRST if analysis.structural.more else ""
         if undecided:
-            hint = (
-                f"no arbiter names {' and '.join(undecided[0])}: the order of the file decides; add one to `arbiters`"
-            )
+            nobody = f"no arbiter names {' and '.join(undecided[0])}: the order of the file decides"
+            hint = f"{nobody}; {_who_may_decide(net, undecided)}"
         pair = (undecided or analysis.met)[0]
         witness = space.witness(analysis.meeting(pair), f"here {' and '.join(pair)} compete")
         return no(_spelled(analysis.met), witness, hint)
 
     return question.ask(analysis.space, find)
+
+
+def _who_may_decide(net: Net, undecided: Sequence[Pair]) -> str:
+    """How to have an arbiter decide between the first pair: one is for all of a conflict component, and has it alone."""
+    component_of = conflicts(net).component_of
+    here = component_of[net.transition_index[undecided[0][0]]]
+    for arbiter in net.arbiters:
+        if component_of[net.transition_index[arbiter.among[0]]] == here:
+            return f"name them in `among` of the arbiter '{arbiter.name}', too"
+    competing = {net.transition_index[name] for pair in undecided for name in pair}
+    among = [net.transitions[t].name for t in sorted(competing) if component_of[t] == here]
+    return str(arbitration(among, [arbiter.name for arbiter in net.arbiters]))
 
 
 def race_free(analysis: ConflictAnalysis[Any]) -> Verdict:

@@ -31,7 +31,7 @@ from firable.nets.time_limits import only_after_a_timeout, waiting_for_a_timer
 from firable.nets.verdict import Verdict, Weight, Witness
 from firable.semantics.algebra import BOOL
 from firable.semantics.arbitration import Arbitration
-from firable.semantics.conflict import jointly_openable
+from firable.semantics.conflict import at_odds
 from firable.semantics.firing import firable
 from firable.semantics.player import FiringSet, Player, holds_in
 from firable.semantics.trace import Discipline
@@ -93,8 +93,10 @@ def eager_run(net: Net, *, steps_max: int = STEPS_MAX, deadline: Deadline = NEVE
     while len(fired) < steps_max and not deadline.over:
         if not enabled:
             return EagerRun(tuple(fired), ())
-        if not jointly_openable(net, enabled):
-            raise GatesCannotBeOpenError("transitions that are firable together want a signal both 1 and 0")
+        if (found := at_odds(net, enabled)) is not None:
+            *two, signal = (net.transitions[found[0]].name, net.transitions[found[1]].name, found[2])
+            said = f"{' and '.join(two)} are firable together, and want the signal '{signal}' 1 and 0"
+            raise GatesCannotBeOpenError(said)
         step, turns = arbitration.decide(enabled, turns)
         marking = player.fire(marking, step)
         enabled = running.after(marking)

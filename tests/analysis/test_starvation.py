@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -69,7 +71,23 @@ def test_an_effective_conflict_warns_only_where_no_arbiter_names_it() -> None:
     unnamed = check(two_ways()).verdict("effective-conflicts")
     assert (named.status, str(named.weight)) == (Status.VIOLATED, "information")
     assert (unnamed.status, str(unnamed.weight)) == (Status.VIOLATED, "warning")
-    assert "t1 and t2" in unnamed.hint
+    assert unnamed.hint == (
+        "no arbiter names t1 and t2: the order of the file decides; "
+        "add to `arbiters`: `t1_or_t2: {among: [t1, t2], by: priority}`"
+    )
+
+
+def test_who_competes_beside_an_arbiter_is_bidden_to_stand_in_that_one() -> None:
+    net = two_ways(Arbiter("p", ("t2", "t1")))
+    net = replace(net, transitions=(*net.transitions, Transition("t5", ("p",), ("a",))))
+    found = check(net).verdict("effective-conflicts")
+    assert found.hint.endswith("the order of the file decides; name them in `among` of the arbiter 'p', too")
+
+
+def test_an_arbiter_that_is_offered_names_all_that_compete_there() -> None:
+    net = two_ways()
+    net = replace(net, transitions=(*net.transitions, Transition("t5", ("p",), ("a",))))
+    assert "{among: [t1, t2, t5], by: priority}" in check(net).verdict("effective-conflicts").hint
 
 
 def test_gates_that_cannot_all_be_open_leave_starvation_unknown() -> None:
@@ -84,7 +102,7 @@ def test_gates_that_cannot_all_be_open_leave_starvation_unknown() -> None:
         eager_run(net)
     verdict = check(net).verdict("starvation")
     assert verdict.status is Status.UNKNOWN
-    assert verdict.bound == "transitions that are firable together want a signal both 1 and 0"
+    assert verdict.bound == "t and u are firable together, and want the signal 's' 1 and 0"
     assert (verdict.method, verdict.code) == ("eager run of synchronous steps under the arbiters", "")
 
 
