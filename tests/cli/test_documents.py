@@ -20,11 +20,15 @@ import pytest
 from support.sessions import fits, run_here, session
 
 from firable.cli.main import firable
+from firable.nets import document as doc
+from firable.nets.document_errors import keys_of
 
 DOCS: Final = Path(__file__).parents[2] / "docs"
 BLOCK: Final = re.compile(r"^```(?P<kind>\w+)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 SAVED: Final = re.compile(r"Save\s+(?:this|it)\s+(?:again\s+)?as\s+`([^`]+)`")
 PAGES: Final = sorted(path for path in DOCS.rglob("*.md") if path.parent != DOCS / "codes")
+SHOWN: Final = (doc.NetDocument, doc.ControllerDocument, doc.TransitionDocument, doc.ArbiterDocument,
+                doc.PropertyDocument, doc.LeadsToDocument)  # fmt: skip
 
 
 def _with(kind: str) -> list[str]:
@@ -86,6 +90,14 @@ def test_the_documents_are_made_without_a_warning(tmp_path: Path) -> None:
     assert "unless" in index  # search asks no server
     pages = {str(page.relative_to(DOCS).with_suffix(".html")) for page in PAGES}
     assert all((tmp_path / "html" / page).is_file() for page in pages)
+
+
+@pytest.mark.parametrize("key", sorted({key for model in SHOWN for key in keys_of(model)}))
+def test_a_key_of_a_net_file_is_written_out_for_who_reads_the_sources_of_the_pages(key: str) -> None:
+    """The tables of keys are there only once the pages are made; without them the examples have to do."""
+    blocks = [block for page in PAGES for block in BLOCK.finditer(page.read_text("utf-8"))]
+    written = [block["text"] for block in blocks if block["kind"] == "yaml" and "firable: 1\n" in block["text"]]
+    assert any(re.search(rf"(?:^|[ {{]){key}:", text, re.MULTILINE) for text in written)
 
 
 def test_no_page_shows_a_command_that_nothing_looks_at() -> None:
