@@ -94,6 +94,19 @@ NET: Final = Shape(
 )
 
 
+_KINDS: Final = {
+    "firable": ("a net file", "`firable check` and most commands"),
+    "firable_plant": ("a plant file", "`--machines` of `check`, and `--plant` of `run` and `sim`"),
+    "firable_bind": ("a binding", "`firable io`, and `--bind` of `run`"),
+    "firable_tasks": ("a file of tasks", "`--tasks` of `refine`"),
+    "firable_layout": ("a layout file", "`draw` and `view`, where it stands beside its net"),
+    "firable_evidence": ("evidence", "`firable verify`"),
+    "firable_report": ("a report", "other programs"),
+    "firable_signatures": ("signatures", "`firable sign` and `firable run`, beside their bundle"),
+}
+"""By the key of its version, what each kind of file is, and what reads it."""
+
+
 def version_problem(source: Source, tree: Node, shape: Shape = NET) -> Diagnostic | None:
     """What is wrong with the line such as `firable: 1`, which tells what file this is and of which version."""
     wanted = shape.version
@@ -101,6 +114,12 @@ def version_problem(source: Source, tree: Node, shape: Shape = NET) -> Diagnosti
     if not isinstance(tree, MappingNode):
         return Diagnostic("F1010", f"this is not a {shape.file}: it has no keys", hint, span=node_span(source, tree))
     entry = tree.entries.get(wanted)
+    other = next((key for key in tree.entries if key in _KINDS), None)
+    if entry is None and other is not None:
+        what, readers = _KINDS[other]
+        message = f"the key '{wanted}' is missing: this is {what}, and no {shape.file}"
+        hint = f"{what} is for {readers}; a {shape.file} begins with `{wanted}: 1`"
+        return Diagnostic("F1009", message, hint, span=node_span(source, tree.entries[other][0]))
     if entry is None:
         close = next((key for key in tree.entries if did_you_mean(key, [wanted])), None)
         span = node_span(source, tree.entries[close][0]) if close else source.span(tree.line, tree.column)

@@ -17,6 +17,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Final
 
+from firable.nets.archive import SIGNATURE
 from firable.nets.diagnostics import Diagnostic, InputError, Span, did_you_mean
 
 EXCERPT_CHARACTERS_MAX: Final = 100
@@ -106,7 +107,10 @@ def _no_text(path: str | Path, data: bytes, at: int, message: str) -> InputError
     """The refusal of bytes that are no text, at the line and column of the first that is none."""
     source = Source(printable(str(path)), data.decode("utf-8-sig", "replace"))
     before = Source("", data[:at].decode("utf-8-sig")).lines
-    return source.refuse("F1004", message, "save the file as UTF-8 text", len(before), len(before[-1]) + 1)
+    hint = "save the file as UTF-8 text"
+    if data.startswith(SIGNATURE):
+        hint = "this is a bundle, or another archive: `firable run` reads a bundle"
+    return source.refuse("F1004", message, hint, len(before), len(before[-1]) + 1)
 
 
 def read_bytes(path: str | Path, size_bytes_max: int) -> bytes:

@@ -367,3 +367,41 @@ def test_a_net_file_is_told_by_its_version() -> None:
 
     source = Source("f", HEAD)
     assert version_problem(source, parse_tree(source)) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "what", "how"),
+    [
+        ("firable_plant: 1\n", "a plant file", "`--machines` of `check`, and `--plant` of `run` and `sim`"),
+        ("# b\nfirable_bind: 1\n", "a binding", "`firable io`, and `--bind` of `run`"),
+        ("firable_tasks: 1\n", "a file of tasks", "`--tasks` of `refine`"),
+        ("firable_layout: 1\n", "a layout file", "`draw` and `view`, where it stands beside its net"),
+        ('{"firable_evidence": 2}\n', "evidence", "`firable verify`"),
+        ('{"firable_report": 1}\n', "a report", "other programs"),
+        ('{"firable_signatures": 1}\n', "signatures", "`firable sign` and `firable run`, beside their bundle"),
+    ],
+)
+def test_a_file_of_another_kind_is_told_by_what_it_is_and_what_reads_it(text: str, what: str, how: str) -> None:
+    with pytest.raises(InputError) as refused:
+        parse_net(text)
+    (problem,) = refused.value.diagnostics
+    assert (problem.code, problem.message) == ("F1009", f"the key 'firable' is missing: this is {what}, and no net file")
+    assert problem.hint == f"{what} is for {how}; a net file begins with `firable: 1`"
+    assert problem.span is not None
+    assert (problem.span.line, problem.span.column) == (text.count("\n"), 1 if text[0] != "{" else 2)
+
+
+def test_a_net_file_is_no_plant_file() -> None:
+    from firable.nets.machines.plant_file import parse_plant
+
+    with pytest.raises(InputError) as refused:
+        parse_plant(HEAD)
+    (problem,) = refused.value.diagnostics
+    assert problem.message == "the key 'firable_plant' is missing: this is a net file, and no plant file"
+
+
+def test_a_bundle_where_text_is_read_is_told_as_one(tmp_path: Path) -> None:
+    (tmp_path / "cell.bundle").write_bytes(b"PK\x03\x04\x14\x00\xff")
+    with pytest.raises(InputError, match=r"F1004.*byte 6 is 0xff") as refused:
+        read_net(tmp_path / "cell.bundle")
+    assert refused.value.diagnostics[0].hint == "this is a bundle, or another archive: `firable run` reads a bundle"
