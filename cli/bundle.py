@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import shlex
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
     from firable.analysis.spaces.reachability import Budget
     from firable.decompose.refinement.sealing import Origin
     from firable.nets.verdict import Verdict
+
+_UNMADE: Final = "F4003"
 
 
 @click.command(short_help="Check and prove a net, and seal it in a bundle that may run.")
@@ -76,8 +79,41 @@ def bundle(
         raise click.UsageError("--tasks goes with --conceptual, whose places name tasks")
     made_of = None if conceptual is None else (conceptual, files)
     return answer(
-        "bundle", format_, with_page(lambda: _report(net, output, limits, more, machines, made_of), page), _show
+        "bundle", format_, with_page(lambda: _telling(net, output, limits, more, machines, made_of), page), _show
     )
+
+
+def _telling(argument: str, output: str, *more: Any) -> Report:
+    """The report, which where no bundle was made tells of what stands in its place: a script would go on with that."""
+    from firable.nets.diagnostics import Diagnostic, InputError, Severity
+
+    try:
+        report = _report(argument, output, *more)
+    except InputError as error:
+        if not (older := _older(output)):
+            raise
+        *others, last = error.diagnostics
+        raise InputError([*others, replace(last, hint="; ".join(filter(None, (last.hint, older))))]) from None
+    if report.files or not (older := _older(output)):
+        return report
+    hint = "take it away, so that nothing goes on with it"
+    return replace(report, notes=(*report.notes, Diagnostic(_UNMADE, older, hint, severity=Severity.WARNING)))
+
+
+def _older(output: str) -> str:
+    """What is told of a file that stands where the bundle was to be written; nothing where there is none."""
+    from firable.nets.bundle import read_bundle
+    from firable.nets.diagnostics import InputError
+    from firable.nets.source import printable
+
+    if not Path(output).is_file():
+        return ""
+    try:
+        older = read_bundle(output)
+        what = f"an older bundle, of '{older.net.name}', identity {older.digest[:16]}"
+    except InputError:
+        what = "an older file"
+    return f"{printable(output)} was not made by this call: it is {what}"
 
 
 def _origin(conceptual: str, files: tuple[str, ...], allowed: Budget) -> Origin:
@@ -152,7 +188,8 @@ def _told(verdict: Verdict, argument: str, machines: str | None) -> Verdict:
 
 def _show(report: Report) -> None:
     for note in report.notes:
-        text.show_diagnostic(note)
+        if note.code != _UNMADE:
+            text.show_diagnostic(note)
     text.heading(report.net, report.input)
     # What is told for information has its place in `check` and `split`; a warning is told wherever it is counted.
     told = [v for v in report.verdicts if not v.holds and (not report.files or v.weight.value == "warning")]
@@ -162,3 +199,6 @@ def _show(report: Report) -> None:
         click.echo(f"  bundle {report.files[0]}, identity {report.figures['bundle_digest'][:16]}…")
     else:
         click.echo("  no bundle was made: only what is proved may run")
+    for note in report.notes:
+        if note.code == _UNMADE:
+            text.show_diagnostic(note)

@@ -14,6 +14,7 @@ import pytest
 from support.published import COORDINATOR_TABLE
 
 from firable.cli.main import COMMANDS, main
+from firable.nets.bundle import read_bundle
 
 ROOT = Path(__file__).parents[2]
 HEADER = (
@@ -185,6 +186,35 @@ def test_a_net_that_may_deadlock_gets_no_bundle(tmp_path: Path, capsys: pytest.C
     assert main(["bundle", "catalogue:one_robot_mc_late", "-o", str(tmp_path / "late.bundle")]) == 1
     assert "no bundle was made" in capsys.readouterr().out
     assert list(tmp_path.iterdir()) == []
+
+
+def test_where_no_bundle_is_made_an_older_one_that_stands_there_is_told(
+    bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    older = tmp_path / "late.bundle"
+    older.write_bytes(Path(bundle).read_bytes())
+    identity = read_bundle(older).digest[:16]
+    said = f"{older} was not made by this call: it is an older bundle, of 'one-robot', identity {identity}"
+    assert main(["bundle", "catalogue:one_robot_mc_late", "-o", str(older)]) == 1
+    told = capsys.readouterr()
+    assert told.out.endswith("no bundle was made: only what is proved may run\n")
+    assert f"warning[F4003]: {said}\n  hint: take it away, so that nothing goes on with it" in told.err
+    code, data = as_json(capsys, "bundle", "catalogue:one_robot_mc_late", "-o", str(older))
+    assert (code, [note["message"] for note in data["reports"][0]["notes"]]) == (1, [said])
+    assert older.read_bytes() == Path(bundle).read_bytes()
+
+
+def test_where_the_net_is_refused_what_stands_at_the_place_of_the_bundle_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "cell.firable.yaml").write_text("firable: 1\ncell: c\nplace: {p: }\n")
+    (tmp_path / "cell.bundle").write_text("of yesterday")
+    for there in (True, False):
+        if not there:
+            (tmp_path / "cell.bundle").unlink()
+        assert main(["bundle", str(tmp_path / "cell.firable.yaml"), "-o", str(tmp_path / "cell.bundle")]) == 2
+        said = f"; {tmp_path}/cell.bundle was not made by this call: it is an older file"
+        assert (said in capsys.readouterr().err) == there
 
 
 def test_a_run_leaves_a_trace_of_the_net(bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
