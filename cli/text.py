@@ -247,8 +247,10 @@ def endings(verdicts: Sequence[Verdict]) -> Iterator[tuple[int, str]]:
     for outcome, word in _OUTCOMES.items():
         if n := sum(verdict.outcome.value == outcome for verdict in expected):
             yield n, word
-    if n := sum(verdict.weight.value == "warning" and verdict.status.value != "proved" for verdict in others):
-        yield n, "warning" if n == 1 else "warnings"
+    warned = [one.status.value for one in others if one.weight.value == "warning" and one.status.value != "proved"]
+    if n := len(warned):
+        unknown = f" ({warned.count('unknown'):,} unknown)" if "unknown" in warned else ""
+        yield n, ("warning" if n == 1 else "warnings") + unknown
 
 
 def columns() -> int:

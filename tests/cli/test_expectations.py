@@ -159,3 +159,27 @@ def test_no_verdict_is_lost_where_two_have_one_name() -> None:
     other = Verdict("fault.safe", Status.VIOLATED, "it goes on", "by hand", Weight.INFORMATION)
     assert held_to((), (one, other)) == (one, other)
     assert overall(held_to((), (one, other))) is Status.VIOLATED
+
+
+UNDECIDED = """\
+firable: 1
+cell: two
+inputs: s
+places: {p: , q: }
+start: p
+transitions:
+  t: {from: p, to: q, if: s}
+  u: {from: p, to: q, unless: s}
+  v: {from: q, to: p}
+"""
+
+
+def test_a_warning_that_is_not_decided_passes_and_is_counted_and_fails_where_the_file_expects_an_end(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "two.firable.yaml").write_text(UNDECIDED)
+    assert main(["check", str(tmp_path / "two.firable.yaml")]) == 0
+    assert ", 1 warning (1 unknown)\n" in capsys.readouterr().out
+    (tmp_path / "two.firable.yaml").write_text(UNDECIDED + "expect: {starvation: proved}\n")
+    assert main(["check", str(tmp_path / "two.firable.yaml")]) == 3
+    assert "not decided: " in capsys.readouterr().out

@@ -220,6 +220,14 @@ def test_a_warning_is_no_failure_of_the_whole() -> None:
     assert "! warning it warns" in words
 
 
+def test_warnings_that_are_not_decided_are_counted_apart() -> None:
+    warnings = [Verdict(f"w{i}", Status.UNKNOWN, "it warns", "m", Weight.WARNING, bound="b") for i in range(2)]
+    found = Verdict("w", Status.VIOLATED, "it warns", "m", Weight.WARNING)
+    proved = Verdict("p", Status.PROVED, "it holds", "m")
+    words = Reading(page_of(report_with(proved, found, *warnings))).words
+    assert "✓ all hold 1 proved 3 warnings (2 unknown)" in words
+
+
 def test_sections_without_content_are_left_out() -> None:
     page = Reading(page_of(report_with(Verdict("p", Status.PROVED, "it holds", "m"))))
     ids = [attributes["id"] for name, attributes in page.tags if name == "section"]
