@@ -23,6 +23,7 @@ from typing import Final
 
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.formula import (
+    CONSTANT_ATOMS,
     Compare,
     Count,
     FormulaError,
@@ -70,6 +71,10 @@ class Query:
         return cls(name, QueryKind.CTL if Logic.CTL in logics(formula) else QueryKind.LTL, formula)
 
 
+_ALONE: Final = frozenset({QueryKind.LIVE, QueryKind.QUASI_LIVE, QueryKind.STABLE_MARKING, QueryKind.ONE_SAFE})
+_NO_SEMICOLON: Final = "a query has no semicolon"
+
+
 def parse_query(text: str, name: str = "query") -> Query:
     """Read one query; its names are not looked up.
 
@@ -83,7 +88,7 @@ def parse_query(text: str, name: str = "query") -> Query:
     word, rest = (*re.split(r"\s", text, maxsplit=1), "")[:2]
     offset = len(text) - len(rest)
     match word:
-        case QueryKind.LIVE | QueryKind.QUASI_LIVE | QueryKind.STABLE_MARKING | QueryKind.ONE_SAFE:
+        case _ if word in _ALONE:
             if rest.strip():
                 raise FormulaError(f"nothing follows {word!r}", offset)
             return Query(name, QueryKind(word))
@@ -184,7 +189,7 @@ class _Lines:
             try:
                 query = parse_query(text.strip(), name)
             except FormulaError as error:
-                hint = "docs/queries.md has the grammar"
+                hint = _hint_on(text)
                 self.refuse("F1012", f"not a query: {error.message}", hint, number, column + error.column)
                 continue
             for problem in known.problems(query):
@@ -203,6 +208,8 @@ class KnownNames:
 
     def problems(self, query: Query) -> Iterator[Diagnostic]:
         """A problem with each name of the query that the net does not have, each name once a file."""
+        if isinstance(query.formula, Holds):  # a word alone
+            yield from self._unknown("place", query.formula.place, self._places, CONSTANT_ATOMS | _ALONE)
         atoms = [] if query.formula is None else list(atoms_in(query.formula))
         for name in (*query.places, *(atom.place for atom in atoms if isinstance(atom, Holds))):
             yield from self.place(name)
@@ -218,10 +225,16 @@ class KnownNames:
         """The problem with the name of a transition, if it is unknown and not yet reported."""
         yield from self._unknown("transition", name, self._transitions)
 
-    def _unknown(self, kind: str, name: str, known: Set[str]) -> Iterator[Diagnostic]:
+    def _unknown(
+        self, kind: str, name: str, known: Set[str], words: Set[str] = CONSTANT_ATOMS
+    ) -> Iterator[Diagnostic]:
         if name not in known and (kind, name) not in self._asked:
             self._asked.add((kind, name))
-            problem = unknown_in_formula(kind, name, self.net, (name,), f"a query names the {kind}s of the net")
+            hint = f"a query names the {kind}s of the net"
+            problem = unknown_in_formula(kind, name, self.net, (name,), hint, words)
+            if (before := name.removesuffix(";")) != name:
+                write = f"write `{before}`" if before in known | words else "leave it out"
+                problem = replace(problem, hint=f"{_NO_SEMICOLON}: {write}")
             yield replace(problem, message=problem.message.replace(f"'{name}'", quoted(name)))
 
 
@@ -234,12 +247,19 @@ def query_named(text: str, net: Net, name: str = "query") -> Query:
     try:
         query = parse_query(text.strip(), name)
     except FormulaError as error:
-        hint = "docs/queries.md has the grammar"
+        hint = _hint_on(text)
         span = source.span_at(len(text) - len(text.lstrip()) + error.column)
         raise InputError([Diagnostic("F1012", f"not a query: {error.message}", hint, span=span)]) from None
     if problems := list(KnownNames(net).problems(query)):
         raise InputError(replace(problem, span=source.span_at(*_named(problem, text))) for problem in problems)
     return query
+
+
+def _hint_on(text: str) -> str:
+    """What helps who wrote this for a query."""
+    if text.rstrip().endswith(";"):
+        return f"{_NO_SEMICOLON}: leave it out"
+    return "`firable explain F1012` shows how queries are written"
 
 
 def _named(problem: Diagnostic, text: str) -> tuple[int, int]:

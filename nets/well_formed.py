@@ -7,7 +7,7 @@ express, such as a completion signal that gates nothing, is a `ValueError`: the 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -393,15 +393,24 @@ def _properties(net: Net) -> Iterator[Diagnostic]:
 
 
 def unknown_in_formula(
-    kind: str, name: str, net: Net, subject: Subject, hint: str = "declare it first, or correct the name"
+    kind: str,
+    name: str,
+    net: Net,
+    subject: Subject,
+    hint: str = "declare it first, or correct the name",
+    words: Set[str] = CONSTANT_ATOMS,
 ) -> Diagnostic:
-    """The diagnostic on a name in a formula that no place, or no transition, of the net has."""
+    """The diagnostic on a name in a formula that no place, or no transition, of the net has.
+
+    `words` may stand where a place does, so that one of them may be what was meant.
+    """
     if kind == "place":
         transitions = {transition.name for transition in net.transitions}
         if name in transitions:
             said = f"write `firable({name})` where it may fire, or name a place"
             return Diagnostic("F2002", f"'{name}' is a transition, and no place", said, subject)
-        return unknown_name("F2002", kind, name, {place.name for place in net.places}, subject, hint)
+        known = {place.name for place in net.places} | (words - {name})
+        return unknown_name("F2002", kind, name, known, subject, hint)
     if any(place.name == name for place in net.places):
         filling = next(
             (f", such as '{one.name}', which puts a token on it" for one in net.transitions if name in one.outputs), ""

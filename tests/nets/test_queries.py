@@ -105,6 +105,29 @@ def test_a_single_query_is_checked_like_a_file() -> None:
 
 
 @pytest.mark.parametrize(
+    ("text", "hint"),
+    [
+        ("AG EF strat", "did you mean 'start'? a query names the places of the net"),
+        ("EF daedlock", "did you mean 'deadlock'? a query names the places of the net"),
+        ("liv", "did you mean 'live'? a query names the places of the net"),
+        ("EF liv", "a query names the places of the net"),
+        ('EF "start"', "a query names the places of the net"),
+        ("EF start;", "a query has no semicolon: write `start`"),
+        ("EF p;", "a query has no semicolon: write `p`"),
+        ("live;", "a query has no semicolon: write `live`"),
+        ("EF (p);", "a query has no semicolon: leave it out"),
+        ("EF p and", "`firable explain F1012` shows how queries are written"),
+    ],
+)
+def test_the_hint_on_what_is_no_query_knows_the_words_of_queries(text: str, hint: str) -> None:
+    for read in (lambda: query_named(text, NET), lambda: parse_queries(f"a: {text}\n", NET)):
+        with pytest.raises(InputError) as refused:
+            read()
+        (problem,) = refused.value.diagnostics
+        assert problem.hint == hint
+
+
+@pytest.mark.parametrize(
     ("text", "code", "line", "column"),
     [
         ("AG (p\n  and q\n  or)", "F1012", 3, 5),

@@ -158,6 +158,8 @@ TABLE = (
         "F2004 5:31", "write `a` for a token on it, or name a transition, such as 't', which puts"),
     net("token on a transition", "transitions: {t: }\nproperties: {p: {never: t}}\n", "F2002 4:25",
         "write `firable(t)` where it may fire"),
+    net("word of formulas misspelt", "places: {a: }\nproperties: {p: {always_possible: strat}}\n", "F2002 4:35",
+        "did you mean 'start'?"),
     net("unknown transition in a formula", "properties: {p: {never: firable(go)}}\n", "F2004 3:33", "declare it"),
     net("place with the name of an atom", "places: {start: }\nproperties: {p: {never: start}}\n", "F2012 3:10",
         "rename the place"),
