@@ -255,6 +255,17 @@ def test_what_is_not_a_net_here_is_refused(text: str, code: str) -> None:
     assert set(codes(text)) == {code}
 
 
+@pytest.mark.parametrize("digits", ["9" * 10, "1" * 5000, "Default," + "9" * 12])
+def test_a_marking_or_weight_of_too_many_digits_is_told_to_be_too_large(digits: str) -> None:
+    marked = f'<place id="p"><initialMarking><text>{digits}</text></initialMarking></place>'
+    weighed = P + T + arc("p", "t", f"<inscription><text>{digits}</text></inscription>")
+    for body, what in ((marked, "marking"), (weighed, "weight")):
+        with pytest.raises(InputError) as refused:
+            parse_pnml(pnml(body))
+        (problem,) = refused.value.diagnostics
+        assert (problem.code, problem.hint) == ("F1013", f"this {what} is too large: one token or arc is all there can be")
+
+
 def test_a_refusal_points_at_the_element() -> None:
     with pytest.raises(InputError) as refused:
         parse_pnml("<pnml>\n <net id='n'>\n  <place id='p'/>\n  <place id='p'/>\n </net>\n</pnml>", "n.pnml")
