@@ -36,6 +36,13 @@ def given(value: object) -> object:
     return value
 
 
+def _with_arcs(value: object) -> object:
+    # Nothing is no transition: it would fire for ever, where somebody has yet to say what it takes.
+    if value is None:
+        raise PydanticCustomError("no_arcs", "nothing")
+    return value
+
+
 def as_integer(value: object) -> object:
     """A text of digits as the number it is; anything else as it was."""
     # The reader resolves no numbers, so that a name such as `007` stays as it is written.
@@ -159,7 +166,10 @@ class ControllerDocument(StrictDocument):
 
 
 class TransitionDocument(StrictDocument):
-    """A transition; `if` and `unless` name places (internal gates) or signals (external gates)."""
+    """A transition; `if` and `unless` name places (internal gates) or signals (external gates).
+
+    `{}` is one that takes and puts nothing, and so may always fire.
+    """
 
     number: OptionalNumber = Field(default=None, description="The number in the coordinator table.")
     inputs: Names = Field(default=_NO_NAMES, alias="from", description="The places of which it takes the tokens.")
@@ -256,7 +266,12 @@ class NetDocument(StrictDocument):
     start: Names = Field(default=[], description="The places without an owner that hold a token at first.")
     inputs: Names = Field(default=[], description="The sensors without an owner.")
     places: Places | None = Field(default=None, description="The places without an owner.")
-    transitions: dict[Name, TransitionDocument | None] | None = Field(
+    transitions: (
+        dict[
+            Name, Annotated[TransitionDocument, BeforeValidator(_with_arcs, json_schema_input_type=TransitionDocument)]
+        ]
+        | None
+    ) = Field(
         default=None,
         description="The transitions by their names; of those that several controllers share, each has a part.",
     )

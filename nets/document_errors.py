@@ -215,6 +215,8 @@ def _problem(source: Source, tree: Node, shape: Shape, error: _Error, unknown: C
             f"write `{path[-1]}:`" if written else f"add `{path[-1]}:`",
             span=node_span(source, written or owner[0] or owner[1]),
         )
+    if kind == "no_arcs" and _has_slipped(list(nodes_along(tree, path[:-1]))[-1][1], shape.keys_at(path)):
+        return None  # its keys stand beside it, where that is said
     if kind in {"refused", "value_error"}:  # what a model says itself; with a hint the first, and the second of others
         said = str(context.get("error", error.message)) + _inside(path)
         return Diagnostic("F1010", said, str(context.get("hint", "")), span=node_span(source, key or node))
@@ -275,6 +277,12 @@ def _misplaced(source: Source, tree: Node, shape: Shape, path: Path, kind: str) 
     return None
 
 
+def _has_slipped(table: Node, inner: Collection[str]) -> bool:
+    """Whether keys of an entry stand in the table itself, as names of entries."""
+    entries = table.entries if isinstance(table, MappingNode) else {}
+    return any(name in inner and not isinstance(value, MappingNode) for name, (_, value) in entries.items())
+
+
 def _means(entry: Node, keys: tuple[str, ...]) -> bool:
     """Whether each key of an entry is one of these, or a slip of the pen: then its name is a name."""
     return isinstance(entry, MappingNode) and all(key in keys or did_you_mean(key, keys) for key in entry.entries)
@@ -332,6 +340,8 @@ def _wanted(kind: str, context: Mapping[str, Any], node: Node, path: Path) -> st
             return "a time is expected, such as `5s`, or a mapping with `time: 5s`"
         case "nothing_given":
             return f"write it, or leave `{path[-1]}` out for what holds without it"
+        case "no_arcs":
+            return "write what it takes and puts, `{from: p, to: q}`, or `{}` for a transition that waits for nothing"
         case "string_type" if is_word:
             return f'a name or text is expected: write "{text}" in double quotes if it is one'
         case "string_type" | "string_too_short":

@@ -255,7 +255,7 @@ class _Import:
             self.refuse(record, "F1014", f"{described(record)} has a time window", "time is not part of a net here")
         weight = _integer(text)
         if weight is None or weight == 0:
-            hint = _too_large("weight") if _LONG_NUMBER.fullmatch(text) else "a weight is a number from 1"
+            hint = _TOO_LARGE if _LONG_NUMBER.fullmatch(text) else "a weight is a number from 1"
             self.refuse(record, "F1013", f"{described(record)} has the weight {quoted(text)}", hint)
             return 1
         if weight > 1 and kind not in _NORMAL:
@@ -269,7 +269,7 @@ class _Import:
         text = record.labels.get("initialMarking") or record.attributes.get("initialMarking") or "0"
         tokens = _integer(text)
         if tokens is None:
-            hint = _too_large("marking") if _LONG_NUMBER.fullmatch(text) else "a marking is a number"
+            hint = _TOO_LARGE if _LONG_NUMBER.fullmatch(text) else "a marking is a number"
             self.refuse(record, "F1013", f"{described(record)} has the marking {quoted(text)}", hint)
         elif tokens > 1:
             self.refuse(
@@ -379,10 +379,7 @@ def _integer(text: str) -> int | None:
 
 
 _LONG_NUMBER: Final = re.compile(r"(?:Default,)?\s*[0-9]{10,}\s*")
-
-
-def _too_large(what: str) -> str:
-    return f"this {what} is too large: one token or arc is all there can be"
+_TOO_LARGE: Final = "it is too large: a place holds one token at most here, and arcs have no weights"
 
 
 def _legal(text: str) -> str:

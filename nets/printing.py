@@ -177,7 +177,7 @@ def _lines(net: Net) -> Iterator[str]:
         yield from unowned
     late = {t for _, t in _faults(net, net.places)}
     rows = ((t.name, _transition(net, t)) for i, t in enumerate(net.transitions) if i not in late)
-    yield from _table("transitions", rows)
+    yield from _table("transitions", rows, nothing=" {}")
     yield from _table(
         "arbiters",
         ((a.name, [("among", flow_list(a.among)), ("by", str(a.by))]) for a in net.arbiters),
@@ -267,20 +267,20 @@ def _property(prop: Property | TemporalProperty) -> list[tuple[str, str]]:
     return [("leads_to", flow_mapping((("from", source), ("to", target), ("fairness", str(prop.fairness)))))]
 
 
-def _table(key: str, rows: Iterable[tuple[str, list[tuple[str, str]]]]) -> Iterator[str]:
-    lines = [line for name, entries in rows for line in _entry(name, entries, "  ")]
+def _table(key: str, rows: Iterable[tuple[str, list[tuple[str, str]]]], nothing: str = "") -> Iterator[str]:
+    lines = [line for name, entries in rows for line in _entry(name, entries, "  ", nothing)]
     if lines:
         yield ""
         yield f"{key}:"
         yield from lines
 
 
-def _entry(name: str, entries: list[tuple[str, str]], indent: str) -> Iterator[str]:
-    """One named entry, on one line if it is short enough."""
+def _entry(name: str, entries: list[tuple[str, str]], indent: str, nothing: str = "") -> Iterator[str]:
+    """One named entry, on one line if it is short enough; `nothing` stands for no entries."""
     head = f"{indent}{scalar(name)}:"
     line = f"{head} {flow_mapping(entries)}"
     if not entries:
-        yield head
+        yield f"{head}{nothing}"
     elif len(line) <= WIDTH_CHARACTERS:
         yield line
     else:

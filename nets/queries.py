@@ -225,9 +225,7 @@ class KnownNames:
         """The problem with the name of a transition, if it is unknown and not yet reported."""
         yield from self._unknown("transition", name, self._transitions)
 
-    def _unknown(
-        self, kind: str, name: str, known: Set[str], words: Set[str] = CONSTANT_ATOMS
-    ) -> Iterator[Diagnostic]:
+    def _unknown(self, kind: str, name: str, known: Set[str], words: Set[str] = CONSTANT_ATOMS) -> Iterator[Diagnostic]:
         if name not in known and (kind, name) not in self._asked:
             self._asked.add((kind, name))
             hint = f"a query names the {kind}s of the net"

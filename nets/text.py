@@ -269,8 +269,7 @@ class _Reading:
     def transitions(self, places: tuple[Place, ...], signals: tuple[Signal, ...]) -> Iterator[Transition]:
         external = {signal.name for signal in signals}
         completion = {place.name: place.completion for place in places if place.completion is not None}
-        for name, body in (self.document.transitions or {}).items():
-            transition = body or doc.TransitionDocument()
+        for name, transition in (self.document.transitions or {}).items():
             inputs, outputs = transition.inputs, transition.outputs
             for both in () if (twice := set(inputs)).isdisjoint(outputs) else sorted(twice.intersection(outputs)):
                 self.problem(

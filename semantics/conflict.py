@@ -156,7 +156,7 @@ def jointly_openable(net: Net, transitions: Iterable[int]) -> bool:
 
 
 def at_odds(net: Net, transitions: Iterable[int]) -> tuple[int, int, str] | None:
-    """Two of these transitions, and a signal that one of them wants 1 and the other one 0; None where there are none."""
+    """Two of these transitions and a signal that one of them wants 1 and the other one 0; None where all agree."""
     wanted: dict[str, tuple[bool, int]] = {}
     for t in transitions:
         for gate in net.transitions[t].external:

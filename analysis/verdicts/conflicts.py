@@ -268,7 +268,7 @@ def effective_conflict_free(analysis: ConflictAnalysis[Any]) -> Verdict:
 
 
 def _who_may_decide(net: Net, undecided: Sequence[Pair]) -> str:
-    """How to have an arbiter decide between the first pair: one is for all of a conflict component, and has it alone."""
+    """How to have an arbiter decide between the first pair: a conflict component has one arbiter at most."""
     component_of = conflicts(net).component_of
     here = component_of[net.transition_index[undecided[0][0]]]
     for arbiter in net.arbiters:

@@ -49,7 +49,7 @@ def add_sensor(source: Source, name: str, owner: str | None = None) -> Source:
 
 def add_transition(source: Source, name: str) -> Source:
     """One more transition, without arcs."""
-    return YamlText(source).with_entry(("transitions",), _named(name), None).source
+    return YamlText(source).with_entry(("transitions",), _named(name), {}).source
 
 
 def add_arbiter(source: Source, arbiter: Arbiter) -> Source:

@@ -121,7 +121,14 @@ class YamlText:
         assert isinstance(node, yaml.MappingNode)
         parts = [(key.start_mark.index, self._end(key, value)) for key, value in node.value]
         index = next(i for i, (key, _) in enumerate(node.value) if key.value == path[-1])
-        return self._checked(self._cut(node, parts, index), expected)
+        text = self._cut(node, parts, index)
+        if len(parts) == 1 and path[:-2] == ("transitions",) and not node.flow_style:
+            above = self._node(path[:-2])
+            assert isinstance(above, yaml.MappingNode)
+            name = next(key for key, _ in above.value if key.value == path[-2])
+            colon = self.text.index(":", name.end_mark.index) + 1
+            text = f"{text[:colon]} {{}}{text[colon:]}"  # a transition of nothing is none
+        return self._checked(text, expected)
 
     def with_item(self, path: Path, key: str, item: str, after: Sequence[str] = ()) -> YamlText:
         """The text with one more name in the list at `key` of the mapping at a path; one name alone is a list of it."""

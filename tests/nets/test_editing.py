@@ -52,9 +52,13 @@ transitions:
   back: {from: robot.busy, to: robot.free, if: robot.touch}
 # end of the file
 """
-FLOW = (
-    "firable: 1\ncell: demo\nplaces: {p: , q: {description: a}}\nstart: p\ntransitions: {t: {from: p, to: [q]}, u: }\n"
-)
+FLOW = """\
+firable: 1
+cell: demo
+places: {p: , q: {description: a}}
+start: p
+transitions: {t: {from: p, to: [q]}, u: {}}
+"""
 
 
 def edited(text: str, edit: Callable[[Source], Source]) -> str:
@@ -81,7 +85,7 @@ def changed(text: str, edit: Callable[[Source], Source]) -> tuple[list[str], lis
         (lambda s: edits.add_place(s, "new", "robot"), [], ["      new:"]),
         (lambda s: edits.add_place(s, "new", "mc"), [], ["    places:", "      new:"]),
         (lambda s: edits.add_controller(s, "agv"), [], ["  agv:"]),
-        (lambda s: edits.add_transition(s, "new"), [], ["  new:"]),
+        (lambda s: edits.add_transition(s, "new"), [], ["  new: {}"]),
         (lambda s: edits.add_sensor(s, "shut", "mc"), [], ["    inputs: shut"]),
         (
             lambda s: edits.add_sensor(s, "shut", "robot"),
@@ -153,7 +157,7 @@ def test_an_edit_changes_its_lines_and_no_others(
         (lambda s: edits.add_place(s, "r"), FLOW.replace("a}}", "a}, r: }")),
         (lambda s: edits.delete(s, Kind.PLACE, "p"), without(FLOW, "p: , ", "start: p\n", "from: p, ")),
         (lambda s: edits.delete(s, Kind.PLACE, "q"), without(FLOW, ", q: {description: a}", ", to: [q]")),
-        (lambda s: edits.connect(s, "u", "to", "q"), FLOW.replace("u: }", "u: {to: q} }")),
+        (lambda s: edits.connect(s, "u", "to", "q"), FLOW.replace("u: {}", "u: {to: q}")),
         (lambda s: edits.connect(s, "t", "to", "p"), FLOW.replace("[q]", "[q, p]")),
         (lambda s: edits.connect(s, "t", "if", "q"), FLOW.replace("[q]", "[q], if: q")),
         (lambda s: edits.describe(s, Kind.PLACE, "q", ""), FLOW.replace("{description: a}", "{}")),
@@ -327,7 +331,7 @@ def test_what_cannot_be_edited_is_refused_with_a_code(edit: Callable[[Source], S
 
 
 def test_a_form_that_would_be_edited_wrongly_is_refused() -> None:
-    text = 'firable: 1\ncell: c\n? places\n: {p: }\n? "transitions"\n: t:\n    from: p\n  u:\n'
+    text = 'firable: 1\ncell: c\n? places\n: {p: }\n? "transitions"\n: t:\n    from: p\n  u: {}\n'
     assert parse_net(text).name == "c"
     with pytest.raises(InputError, match="F1020"):
         edited(text, lambda s: edits.delete(s, Kind.TRANSITION, "t"))
@@ -349,3 +353,16 @@ def test_a_file_is_written_only_while_it_is_what_was_read(tmp_path: Path) -> Non
     with pytest.raises(InputError, match="F1019"):
         after.written("firable: 1\ncell: e\n")
     assert not path.exists()
+
+
+@pytest.mark.parametrize("body", ["{from: p}   # the only arc", "\n    from: p   # the only arc", "{from: p}"])
+def test_a_transition_that_loses_its_last_arc_is_one_without_arcs(body: str) -> None:
+    text = f"firable: 1\ncell: c\nplaces: {{p: }}\ntransitions:\n  t: {body}\n  u: {{}}\n"
+    text = edited(text.replace(": \n", ":\n"), lambda s: edits.disconnect(s, "t", "from", "p"))
+    assert "  t: {}" in text
+    assert parse_net(text).transitions == (Transition("t"), Transition("u"))
+
+
+def test_a_net_without_a_table_of_transitions_gets_one() -> None:
+    text = edited("firable: 1\ncell: c\n", lambda s: edits.add_transition(s, "t"))
+    assert parse_net(text).transitions == (Transition("t"),)

@@ -233,7 +233,7 @@ def test_a_completion_with_the_name_of_a_thing_of_the_plant_is_told_where_it_is_
     assert (problem.code, problem.subject) == ("F2001", ("places", "a"))
     assert "this completion of the net; and something happened that must not" in problem.message
     assert problem.hint.startswith("rename 'plant.accident':")
-    taken = parse_net(text.replace("plant.accident", "done") + "transitions: {M/done/a: }\n")
+    taken = parse_net(text.replace("plant.accident", "done") + "transitions: {M/done/a: {}}\n")
     with pytest.raises(InputError) as refusal:
         close(taken, parse_plant(plant))
     (problem,) = refusal.value.diagnostics

@@ -156,7 +156,7 @@ TABLE = (
         "declare it"),
     net("firing of a place", "places: {a: }\ntransitions: {t: {to: a}}\nproperties: {p: {ltl: G fires(a)}}\n",
         "F2004 5:31", "write `a` for a token on it, or name a transition, such as 't', which puts"),
-    net("token on a transition", "transitions: {t: }\nproperties: {p: {never: t}}\n", "F2002 4:25",
+    net("token on a transition", "transitions: {t: {}}\nproperties: {p: {never: t}}\n", "F2002 4:25",
         "write `firable(t)` where it may fire"),
     net("word of formulas misspelt", "places: {a: }\nproperties: {p: {always_possible: strat}}\n", "F2002 4:35",
         "did you mean 'start'?"),
@@ -178,6 +178,9 @@ TABLE = (
         "leave `within` out for what holds without it"),
     net("task and resource of nothing", "places: {p: {task: }, q: {opens: }}\n", ("F1010 3:14", "F1010 3:27"),
         "leave `task` out for what holds without it"),
+    net("transition of nothing", "places: {p: }\n" + T + "  t:\n  u: {to: p}\n", "F1010 5:3",
+        "write what it takes and puts, `{from: p, to: q}`, or `{}` for a transition that waits for nothing"),
+    net("transition of nothing in braces", "transitions: {t: }\n", "F1010 3:15", "write what it takes and puts"),
     net("number of nothing", "transitions: {t: {number: }}\n", "F1010 3:19", "leave `number` out"),
     net("fault place with no name", ROBOT.replace("at_home}", "at_home, within: {time: 5s, to: }}"), "F1010 9:84",
         "leave `to` out for what holds without it"),
@@ -205,7 +208,7 @@ TABLE = (
     net("until on a sensor", "inputs: done\nplaces: {p: {send: {machine: M, command: C}, until: done}}\n", "F2018 4:53",
         "a completion is a bit that the driver forms"),
     net("signal with the name of a place", "inputs: [p]\nplaces: {p: }\n", "F2001 3:10", "rename one of them"),
-    net("transition with the name of a place", "places: {p: }\ntransitions: {p: }\n", "F2001 4:15",
+    net("transition with the name of a place", "places: {p: }\ntransitions: {p: {}}\n", "F2001 4:15",
         "rename one of them"),
     net("signal twice", "inputs: [a, a]\n", "F2001 3:13", "rename one of them"),
     of("net of two lines", 'firable: 1\ncell: "c\\n  shown"\n', "F2012 2:7", "write it on one line"),
@@ -222,12 +225,15 @@ TABLE = (
     net("two coordinators", "controllers: {a: {coordinator: true}, b: {coordinator: true}}\n", "F2015 3:39",
         "leave `coordinator: true` at one"),
     net("number twice", T + "  t: {number: 1}\n  u: {number: 1}\n", "F2016 5:15", "numbers name the parts"),
-    net("arbiter of an unknown transition", T + "  t:\narbiters: {a: {among: [t, u]}}\n", "F2004 5:27", "declare it"),
-    net("arbiter with nothing to decide", T + "  t:\narbiters: {a: {among: t}}\n", "F2013 5:23", "name at least two"),
-    net("two arbiters for one transition", T + "  t:\n  u:\narbiters: {a: {among: [t, u]}, b: {among: [u, t]}}\n",
+    net("arbiter of an unknown transition", T + "  t: {}\narbiters: {a: {among: [t, u]}}\n", "F2004 5:27",
+        "declare it"),
+    net("arbiter with nothing to decide", T + "  t: {}\narbiters: {a: {among: t}}\n", "F2013 5:23",
+        "name at least two"),
+    net("two arbiters for one transition", T + "  t: {}\n  u: {}\n"
+        "arbiters: {a: {among: [t, u]}, b: {among: [u, t]}}\n",
         ("F2013 6:44", "F2013 6:47"), "a conflict component has one arbiter"),
-    net("arbiter that names a transition twice", T + "  t:\n  u:\narbiters: {a: {among: [t, u, t]}}\n", "F2013 6:23",
-        "only `by: order`"),
+    net("arbiter that names a transition twice", T + "  t: {}\n  u: {}\narbiters: {a: {among: [t, u, t]}}\n",
+        "F2013 6:23", "only `by: order`"),
 )  # fmt: skip
 
 
@@ -387,7 +393,10 @@ def test_a_file_of_another_kind_is_told_by_what_it_is_and_what_reads_it(text: st
     with pytest.raises(InputError) as refused:
         parse_net(text)
     (problem,) = refused.value.diagnostics
-    assert (problem.code, problem.message) == ("F1009", f"the key 'firable' is missing: this is {what}, and no net file")
+    assert (problem.code, problem.message) == (
+        "F1009",
+        f"the key 'firable' is missing: this is {what}, and no net file",
+    )
     assert problem.hint == f"{what} is for {how}; a net file begins with `firable: 1`"
     assert problem.span is not None
     assert (problem.span.line, problem.span.column) == (text.count("\n"), 1 if text[0] != "{" else 2)

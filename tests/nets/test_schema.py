@@ -82,7 +82,7 @@ HEAD = "firable: 1\ncell: c\n"
         "places: {p: , q: {description: x}}\nstart: [p, q]\n",
         "places:\n",
         "controllers: {r: }\n",
-        "transitions: {t: }\n",
+        "transitions: {t: {}}\n",
         "properties: {p: {leads_to: [a, b]}}\nplaces: {a: , b: }\n",
         "properties: {p: {leads_to: {from: a, to: b, fairness: none}}}\nplaces: {a: , b: }\n",
         "properties: {p: {always: true}}\n",

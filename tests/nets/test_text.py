@@ -116,7 +116,7 @@ def test_a_property_is_a_formula_of_one_of_two_logics() -> None:
 
 
 def test_an_arbiter_is_by_priority_unless_it_says_otherwise() -> None:
-    found = net("transitions: {t: , u: }\narbiters: {a: {among: [u, t]}}\n").arbiters
+    found = net("transitions: {t: {}, u: {}}\narbiters: {a: {among: [u, t]}}\n").arbiters
     assert found == (Arbiter("a", ("u", "t"), ArbitrationRule.PRIORITY),)
 
 
