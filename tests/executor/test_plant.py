@@ -1,44 +1,15 @@
 """The simulated cell: the laws it obeys, the faults it raises, and the file that describes it."""
 
-import random
 from pathlib import Path
 
 import pytest
+from support.plant_bench import TEXT, Bench
 
-from firable.executor.cell.disturbances import Disturbance, Drops, NeverCompletes, StuckSensor
-from firable.executor.cell.plant import CommandDone, Plant, PlantFault, PlantReport, SensorChanged
+from firable.executor.cell.disturbances import Drops, NeverCompletes, StuckSensor
+from firable.executor.cell.plant import CommandDone, SensorChanged
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.diagnostics import InputError
-from firable.nets.machines.plant_file import PlantModel, misfits, parse_plant, read_plant
-
-TEXT = """\
-firable_plant: 1
-plant: bench
-stations: [entry, table, exit]
-arrivals:   {station: entry, every_s: 5}
-departures: {station: exit, after_s: 1}
-machines:
-  R:
-    hand: HOME
-    positions: {HOME: , ENTRY: entry, TABLE: table, EXIT: exit}
-    commands:
-      MOVE:  {does: move, takes_s: 2}
-      GRASP: {does: grasp, takes_s: 1}
-      PUT:   {does: put, takes_s: 1}
-      HOLD:  {does: put, takes_s: 1, when_full: wait}
-  M:
-    commands:
-      CLAMP:   {does: clamp, station: table, takes_s: 1}
-      RUN:     {does: process, station: table, takes_s: 3}
-      UNCLAMP: {does: release, station: table, takes_s: 1}
-  B:
-    commands:
-      RUN:  {does: carry, from: entry, to: table, takes_s: 4}
-      STOP: {does: stop}
-sensors:
-  entry: {occupied: entry}
-  hand:  {holding: R}
-"""
+from firable.nets.machines.plant_file import misfits, parse_plant, read_plant
 
 CELLS = [
     *("one_robot", "one_robot_mc_late", "one_robot_mc_late_capacity", "two_robots_shared", "two_robots_separate"),
@@ -47,48 +18,6 @@ CELLS = [
 
 def plant_path(cell: str) -> Path:
     return catalogue_path(cell).with_name(f"{cell}.plant.yaml")
-
-
-def model(text: str = TEXT) -> PlantModel:
-    return parse_plant(text)
-
-
-class Bench:
-    """A plant with a clock; commands run to their end unless told otherwise."""
-
-    def __init__(self, *disturbances: Disturbance, workpieces: int = 2, text: str = TEXT, seed: int = 0) -> None:
-        self.plant = Plant(model(text), workpieces=workpieces, seed=seed, disturbances=disturbances)
-        self.now = 0.0
-        self.reports: list[PlantReport] = self.plant.advance(0.0)
-        self.tickets = 0
-
-    def give(self, machine: str, command: str, **parameters: str) -> list[PlantReport]:
-        self.tickets += 1
-        reports = self.plant.command(self.now, machine, command, parameters, self.tickets)
-        self.reports += reports
-        return reports
-
-    def wait(self, seconds: float) -> list[PlantReport]:
-        self.now += seconds
-        reports = self.plant.advance(self.now)
-        self.reports += reports
-        return reports
-
-    def do(self, machine: str, command: str, **parameters: str) -> list[PlantReport]:
-        return [*self.give(machine, command, **parameters), *self.wait(4.0)]
-
-    def fetch(self) -> None:
-        self.do("R", "MOVE", to="ENTRY")
-        self.do("R", "GRASP", at="ENTRY")
-
-    def load(self) -> None:
-        self.fetch()
-        self.do("R", "MOVE", to="TABLE")
-        self.do("R", "PUT", at="TABLE")
-
-    @property
-    def faults(self) -> list[str]:
-        return [f"{report.machine}: {report.message}" for report in self.reports if isinstance(report, PlantFault)]
 
 
 def test_workpiece_goes_through_and_is_delivered_once() -> None:
@@ -422,114 +351,6 @@ def test_machine_or_command_that_the_plant_lacks_is_said_at_the_table_to_add_it_
         assert problem.span is not None
         assert lacking.splitlines()[problem.span.line - 1].strip() == f"{at}:"
         assert words in problem.hint
-
-
-def judging(*sensors: str, seed: int = 0, workpieces: int = 1, text: str = TEXT) -> Bench:
-    return Bench(workpieces=workpieces, seed=seed, text=text + "".join(f"  {sensor}\n" for sensor in sensors))
-
-
-def shown(reports: list[PlantReport]) -> list[tuple[str, bool]]:
-    """What sensors have come to see, those of the hand and the entry left out."""
-    changes = [report for report in reports if isinstance(report, SensorChanged)]
-    return [(one.signal, one.value) for one in changes if one.signal not in {"entry", "hand"}]
-
-
-def test_workpiece_is_judged_when_it_comes_and_the_judgement_stands_until_it_leaves() -> None:
-    seen = set()
-    for seed in range(20):
-        bench = judging("ok: {passes: table, likely: 0.5}", "nok: {fails: table}", seed=seed)
-        bench.load()
-        ((signal, value),) = shown(bench.reports)
-        assert value
-        seen.add(signal)
-        bench.reports.clear()
-        for command in ("CLAMP", "UNCLAMP"):
-            bench.do("M", command)
-        assert shown(bench.reports) == []
-        bench.do("R", "GRASP", at="TABLE")
-        assert shown(bench.reports) == [(signal, False)]
-    assert seen == {"ok", "nok"}
-
-
-def test_workpiece_that_was_machined_is_judged_again_and_no_other() -> None:
-    seen = set()
-    for seed in range(40):
-        bench = judging("ok: {passes: table, likely: 0.5}", "nok: {fails: table}", seed=seed)
-        bench.load()
-        ((was, _),) = shown(bench.reports)
-        bench.do("M", "CLAMP")
-        bench.give("M", "RUN")
-        bench.reports.clear()
-        bench.wait(2.5)
-        assert shown(bench.reports) == []
-        bench.wait(1)
-        now = {signal for signal, value in shown(bench.reports) if value} or {was}
-        assert len(shown(bench.reports)) in {0, 2}
-        assert [name for name in ("ok", "nok") if bench.plant.shown[name]] == [*now]
-        seen.add((was, *now))
-    assert len(seen) == 4, "whatever it was found, it is good or not"
-
-
-def test_workpiece_is_judged_where_it_comes_in_and_once_more_where_it_is_laid_down() -> None:
-    seen = set()
-    for seed in range(40):
-        bench = judging("fresh: {passes: entry, likely: 0.5}", "ok: {passes: table, likely: 0.5}", seed=seed)
-        at_entry = ("fresh", True) in shown(bench.reports)
-        bench.load()
-        seen.add((at_entry, bench.plant.shown["ok"]))
-        assert not bench.plant.shown["fresh"]
-    assert len(seen) == 4
-
-
-@pytest.mark.parametrize(
-    ("sensor", "likely"),
-    [
-        *(("{passes: entry}", 0.9), ("{fails: entry}", 0.1)),
-        *(("{passes: entry, likely: 0.3}", 0.3), ("{fails: entry, likely: 0.3}", 0.3)),
-        *(("{passes: entry, likely: 0}", 0.0), ("{fails: entry, likely: 1}", 1.0)),
-    ],
-)
-def test_sensor_that_judges_sees_what_comes_as_often_as_is_likely(sensor: str, likely: float) -> None:
-    count = sum(judging(f"judges: {sensor}", seed=seed).plant.shown["judges"] for seed in range(500))
-    assert abs(count / 500 - likely) < 0.06
-    assert likely not in {0.0, 1.0} or count == 500 * likely
-
-
-def test_other_sensor_of_a_station_need_not_say_how_likely_it_is_and_no_one_else_draws_anything() -> None:
-    for seed in range(10):
-        bench = judging("nok: {fails: entry}", "ok: {passes: entry, likely: 0}", "also: {fails: entry}", seed=seed)
-        assert bench.plant.shown == {"entry": True, "hand": False, "nok": True, "ok": False, "also": True}
-    bench = Bench(seed=7)
-    bench.load()
-    assert bench.plant.random.random() == random.Random(7).random()
-
-
-@pytest.mark.parametrize(
-    ("sensor", "message", "hint"),
-    [
-        ("{fails: tabel}", "there is no station 'tabel'", "did you mean 'table'?"),
-        ("{passes: tabel}", "there is no station 'tabel'", "did you mean 'table'?"),
-        ("{passes: table, fails: table}", "a sensor sees one thing", "`passes: STATION` or `fails: STATION`"),
-        ("{passes: table, occupied: table}", "a sensor sees one thing", "`passes: STATION` or `fails: STATION`"),
-        ("{passes: table, may_flicker: true}", "a judgement stands until", "a sensor with `occupied` can have them"),
-        ("{fails: table, may_linger: true}", "a judgement stands until", "a sensor with `occupied` can have them"),
-        ("{fails: table, after_s: 2}", "a sensor sees at once", "`after_s` belongs to `acknowledges`"),
-        ("{occupied: table, likely: 0.5}", "nothing is judged", "`likely` belongs to `passes` and `fails`"),
-        ("{fails: table, likely: 0.3}", "found good with 0.6, as 'ok' says, and here with 0.7", "say it once"),
-        ("{passes: table, likely: 0.4}", "found good with 0.6, as 'ok' says, and here with 0.4", "say it once"),
-    ],
-)
-def test_judgement_that_cannot_be_is_refused(sensor: str, message: str, hint: str) -> None:
-    text = f"{TEXT}  ok: {{passes: table, likely: 0.6}}\n"
-    parse_plant(f"{text}  x: {{fails: table, likely: 0.4}}\n")
-    with pytest.raises(InputError) as refusal:
-        parse_plant(f"{text}  x: {sensor}\n")
-    (problem,) = refusal.value.diagnostics
-    assert problem.code == "F5003"
-    assert message in problem.message
-    assert hint in problem.hint
-    assert problem.span is not None
-    assert problem.span.line == 28
 
 
 def test_hint_at_a_sensor_that_the_plant_lacks_names_all_that_one_can_see() -> None:
