@@ -2,9 +2,8 @@
 
 The loops of a bundle are made by `firable.nets.machines`, for prover and checker alike. So the checker reads the
 plant file a second time, and not as arcs: here a machine *is at* a command or at none, a hand *is at* a position, a
-station or a hand *has* nothing, a raw or a machined workpiece, one on a station *is judged* good or bad; and of each
-thing that can happen it is told, in one state, which states may follow. That the net of the loop does the same in every
-state is compared in `same_loop`.
+station or a hand *has* nothing, a raw or a machined workpiece; and of each thing that can happen it is told, in one
+state, which states may follow. That the net of the loop does the same in every state is compared in `same_loop`.
 
 The meaning is that of docs/machines.md. Commands are sent in the firing itself, one after the other, or late: each
 controller sends a command some time after the firing that it belongs to, and what reads or takes the token of that
@@ -32,17 +31,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 
-from firable.decompose.verification.plant import (
-    ACCIDENT,
-    BAD,
-    GOOD,
-    OVERRUN,
-    DiffersError,
-    State,
-    Things,
-    Value,
-    target_of,
-)
+from firable.decompose.verification.plant import ACCIDENT, OVERRUN, DiffersError, State, Things, Value, target_of
 from firable.nets.machines.loop import Faults, Sending
 from firable.nets.machines.plant_file import Action, Carry, Clamp, Grasp, Move, Process, Put, Release, Stop
 from firable.nets.net import Place, Transition
@@ -164,10 +153,7 @@ class Plant(Things):
             yield {at: place.name} if right else {ACCIDENT: True}
         elif isinstance(action, Carry) and state[has] is None:
             there = state[f"has {action.source}"]
-            if there is None:
-                yield {ACCIDENT: True}
-            else:
-                yield from self.judged_anew({at: place.name, has: there, f"has {action.source}": None})
+            yield {ACCIDENT: True} if there is None else {at: place.name, has: there, f"has {action.source}": None}
         elif isinstance(action, Process):
             right = bool(state[f"clamped {action.station}"]) and state[f"has {action.station}"] == "raw"
             yield {at: place.name} if right else {ACCIDENT: True}
@@ -222,7 +208,7 @@ class Plant(Things):
                     yield {f"clamped {station}": True}
             case Process(station=station):
                 if state[f"has {station}"] is not None:
-                    yield from self.judged_anew({f"has {station}": "machined"})
+                    yield {f"has {station}": "machined"}
             case Release(station=station):
                 yield {f"clamped {station}": False}
             case _:
@@ -232,16 +218,7 @@ class Plant(Things):
         """A workpiece goes from one to the other, where there is one, and the other has none."""
         kind = state[f"has {source}"]
         if kind is not None and state[f"has {target}"] is None:
-            yield from self.judged_anew({f"has {source}": None, f"has {target}": kind})
-
-    def judged_anew(self, changes: Changes) -> Iterator[Changes]:
-        """What comes to a station, or becomes another there, is good or bad where that is judged; what goes is not."""
-        ways = [changes]
-        for thing, lies in changes.items():
-            judged = f"judged {thing.removeprefix('has ')}"
-            if thing.startswith("has ") and judged in self.things:
-                ways = [{**way, judged: one} for way in ways for one in ((None,) if lies is None else (GOOD, BAD))]
-        yield from ways
+            yield {f"has {source}": None, f"has {target}": kind}
 
     def spoils(self, place: Place, state: State) -> Iterator[Changes]:
         """What a machine is at ends in an accident."""
@@ -340,15 +317,13 @@ class Plant(Things):
         """A raw workpiece comes to the first station."""
         entry = f"has {self.model.arrivals.station}"
         if state[entry] is None:
-            for came in self.judged_anew({entry: "raw"}):
-                yield from ({**came, **seen} for seen in self.sensors_see(came, state))
+            yield from ({entry: "raw", **seen} for seen in self.sensors_see({entry: "raw"}, state))
 
     def leaves(self, state: State) -> Iterator[Changes]:
         """A finished workpiece is taken away from the last station; an unfinished one is an accident."""
         last = f"has {self.model.departures.station}"
         if state[last] == self.kinds[-1]:
-            for gone in self.judged_anew({last: None}):
-                yield from ({**gone, **seen} for seen in self.sensors_see(gone, state))
+            yield from ({last: None, **seen} for seen in self.sensors_see({last: None}, state))
         elif state[last] is not None:
             yield {ACCIDENT: True}
 

@@ -1,9 +1,8 @@
 """What there is in a cell with its machines, read from the net and the plant file a second time.
 
 A machine *is at* a command or at none, a hand *is at* a position, a station or a hand *has* nothing, a raw or a
-machined workpiece; what lies on a station *is judged* good or bad where a sensor shows that; a signal, a bit, a clamp
-are so or not. Each such thing has a name here and one value in each state, and the places that the net of the loop has
-for it are named. What can happen to them is told in `happenings`.
+machined workpiece; a signal, a bit, a clamp are so or not. Each such thing has a name here and one value in each state,
+and the places that the net of the loop has for it are named. What can happen to them is told in `happenings`.
 """
 
 from __future__ import annotations
@@ -30,8 +29,6 @@ from firable.nets.net import Net, Place, SignalKind
 
 ACCIDENT: Final = "accident"
 OVERRUN: Final = "overrun"
-GOOD: Final = "good"
-BAD: Final = "bad"
 Value = str | bool | None
 State = Mapping[str, Value]
 
@@ -65,8 +62,7 @@ class Things:
 
     @cached_property
     def things(self) -> dict[str, dict[Value, str]]:
-        """For each thing, the place of the loop that is marked in each value; the value False has none, nor has None
-        of what is judged."""
+        """For each thing, the place of the loop that is marked in each value; the value False has none."""
         found: dict[str, dict[Value, str]] = {f"token of {p.name}": {True: p.name} for p in self.net.places}
         found |= {f"signal {name}": {True: name} for name in (*self.completions, *self.timers)}
         for name, sensor in self.model.sensors.items():
@@ -97,8 +93,6 @@ class Things:
             found[f"has {name}"] = {None: f"plant.{name}.empty"} | lies
             if name in self.clamps:
                 found[f"clamped {name}"] = {True: f"plant.{name}.clamped"}
-            if name in self.judged:
-                found[f"judged {name}"] = {GOOD: f"plant.{name}.passes", BAD: f"plant.{name}.fails"}
         return found | {ACCIDENT: {True: "plant.accident"}, OVERRUN: {True: "plant.overrun"}}
 
     @cached_property
@@ -116,8 +110,6 @@ class Things:
         places = self.things[thing]
         if all(isinstance(value, bool) for value in places):
             return [False, True]
-        if thing.startswith("judged "):
-            return [None, *places]
         never = self.stops if thing.startswith("at ") else ()
         return [value for value in places if value not in never]
 
@@ -125,14 +117,6 @@ class Things:
 
     def ways_to_know(self, thing: str, state: State) -> list[dict[str, Value]]:
         """The values that a thing may have in a state in which it is left open, each with those of what it goes by."""
-        if thing.startswith("judged "):
-            has = thing.replace("judged ", "has ", 1)
-            return [
-                {has: lies, thing: value}
-                for lies in ([state[has]] if has in state else self.values(has))
-                for value in self.values(thing)
-                if (lies is None) == (value is None)
-            ]
         if not thing.startswith("breaks off "):
             return [{thing: value} for value in self.values(thing)]
         at = thing.replace("breaks off ", "at ", 1)
@@ -143,8 +127,7 @@ class Things:
         ]
 
     def assert_exists(self, state: State, changes: Mapping[str, Value]) -> None:
-        """What has changed has one of its values; nothing is broken off but by a machine at a stop, and what lies on a
-        station is judged where a sensor shows that, and nothing else is.
+        """What has changed has one of its values, and nothing is broken off but by a machine at a stop.
 
         Raises `DiffersError` where it is not so: no state is compared in which it is not.
         """
@@ -156,12 +139,6 @@ class Things:
                 continue
             if state[breaks] is not None and not self.comes_to_rest(state[at]):
                 raise DiffersError(f"{machine} breaks off the command of '{state[breaks]}', and is at no stop")
-        for station in self.model.stations:
-            has, judged = f"has {station}", f"judged {station}"
-            if judged not in self.things or changes.keys().isdisjoint((has, judged)):
-                continue
-            if (state[has] is None) != (state[judged] is None):
-                raise DiffersError(f"what lies on {station} is {state[has]}, and what is judged there {state[judged]}")
 
     def comes_to_rest(self, at: Value) -> bool:
         """Whether a machine that is at the command of a place comes to rest."""
@@ -170,7 +147,7 @@ class Things:
     @cached_property
     def start(self) -> State:
         """All is at rest, and no workpiece has come; a token in M0 sends no command."""
-        first: dict[str, Value] = {thing: None if None in self.values(thing) else False for thing in self.things}
+        first: dict[str, Value] = {thing: None if None in self.things[thing] else False for thing in self.things}
         first |= {f"token of {p.name}": p.marked for p in self.net.places}
         return first | {f"hand {name}": m.hand for name, m in self.model.machines.items() if m.hand is not None}
 
@@ -248,12 +225,6 @@ class Things:
         actions = (action for machine in self.model.machines.values() for action in machine.commands.values())
         return {action.station for action in actions if isinstance(action, (Clamp, Release, Process))}
 
-    @cached_property
-    def judged(self) -> set[str]:
-        """The stations of which a sensor shows what passes there, or what fails."""
-        some = (one for sensor in self.model.sensors.values() for one in (sensor.passes, sensor.fails))
-        return {one for one in some if one is not None}
-
     def machine_of(self, place: Place) -> str:
         """The machine that a place commands."""
         assert place.command is not None
@@ -284,11 +255,9 @@ class Things:
             return bool(state[f"key {name}"])
         if sensor.may_flicker or sensor.may_linger:
             return bool(state[f"bit {name}"])
-        if sensor.passes is not None or sensor.fails is not None:
-            return state[f"judged {sensor.passes or sensor.fails}"] == (BAD if sensor.passes is None else GOOD)
         return state[target_of(sensor)] is not None
 
 
 def target_of(sensor: Sensor) -> str:
-    """What a sensor that sees whether there is something looks at."""
+    """What a sensor looks at."""
     return f"has {sensor.occupied or sensor.holding}"

@@ -18,7 +18,6 @@ from typing import Final
 
 from firable.executor.cell.disturbances import Disturbance, Disturbances, StuckSensor
 from firable.nets.machines.plant_file import (
-    GOOD,
     Action,
     Carry,
     Clamp,
@@ -151,12 +150,6 @@ class Plant:
         self.machines = {name: _MachineNow(machine, machine.hand) for name, machine in model.machines.items()}
         self.stations: dict[str, Workpiece | None] = dict.fromkeys(model.stations)
         self.clamped: set[str] = set()
-        judging = [sensor for sensor in model.sensors.values() if sensor.judges is not None]
-        self.likely = {str(one.judges): GOOD for one in judging}
-        """How likely a workpiece is to be found good, at each station where that is judged."""
-        self.likely |= {str(one.judges): one.good for one in judging if one.good is not None}
-        self.found_good: dict[str, bool] = {}
-        """What the workpieces at these were found, where one lies."""
         self.to_come = workpieces
         self.entered = 0
         self.delivered: list[Workpiece] = []
@@ -264,7 +257,7 @@ class Plant:
             self.arrival_due = False
             self.to_come -= 1
             self.entered += 1
-            self._lies(arrivals.station, Workpiece(self.entered))
+            self.stations[arrivals.station] = Workpiece(self.entered)
             if self.to_come:
                 self._in(arrivals.every_s, arrivals.jitter_s, _Arrival())
 
@@ -273,7 +266,7 @@ class Plant:
         workpiece = self.stations[station]
         if workpiece is None:
             return
-        self._gone(station)
+        self.stations[station] = None
         self._wake()
         self.delivered.append(workpiece)
         if not workpiece.processed and any(
@@ -375,7 +368,6 @@ class Plant:
                 self.clamped.add(station)
             case Process(station=station):
                 self._lying(station, f"{name} machines on {station}").processed += 1
-                self._judge(station)
             case Release(station=station):
                 self.clamped.discard(station)
         if (drops := self.disturbances.drops(name, busy.command, machine.times[busy.command])) is not None:
@@ -402,24 +394,11 @@ class Plant:
 
     def _taken(self, station: str | None, doing: str) -> Workpiece:
         workpiece = self._lying(station, doing)
-        self._gone(str(station))
+        self.stations[str(station)] = None
         if station == self.model.arrivals.station:
             self._arrive()
         self._wake()
         return workpiece
-
-    def _lies(self, station: str, workpiece: Workpiece) -> None:
-        self.stations[station] = workpiece
-        self._judge(station)
-
-    def _gone(self, station: str) -> None:
-        self.stations[station] = None
-        self.found_good.pop(station, None)
-
-    def _judge(self, station: str) -> None:
-        """Find a workpiece that has come to a station, or become another there, good or not, where that is judged."""
-        if station in self.likely:
-            self.found_good[station] = self.random.random() < self.likely[station]
 
     def _wake(self) -> None:
         """Let each machine that waits for a station to become free look again."""
@@ -440,7 +419,7 @@ class Plant:
         if (there := self.stations[station]) is not None:
             raise _FaultError(f"{name} pushes workpiece {workpiece.id} onto {station}, where workpiece {there.id} lies")
         machine.holding = None
-        self._lies(station, workpiece)
+        self.stations[station] = workpiece
         if station == self.model.departures.station:
             self._in(self.model.departures.after_s, 0.0, _Departure())
 
@@ -455,8 +434,6 @@ class Plant:
             return self.stations[sensor.occupied] is not None
         if sensor.acknowledges is not None:
             return name in self.pressed
-        if sensor.judges is not None:
-            return self.found_good.get(sensor.judges) is (sensor.passes is not None)
         return self.machines[str(sensor.holding)].holding is not None
 
     def _seen(self) -> Iterator[PlantReport]:

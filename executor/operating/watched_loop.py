@@ -118,13 +118,9 @@ class WatchedLoop:
 
     def _by_others(self, laws: Laws, station: str) -> Iterator[Move]:
         """What machines that are not seen may do at a station: each workpiece comes and goes, each sensor follows."""
-        kinds = [self._bit(laws.has(station, kind)) for kind in laws.kinds]
-        found = (
-            [self._bit(laws.verdict(station, good=good)) for good in (True, False)] if station in laws.judged else [0]
-        )
-        ways = [self._bit(laws.empty(station)), *(kind | verdict for kind in kinds for verdict in found)]
+        ways = [self._bit(laws.empty(station)), *(self._bit(laws.has(station, kind)) for kind in laws.kinds)]
         for before in ways:
-            yield from (Move(before, after & ~before, before ^ after, "") for after in ways if after != before)
+            yield from (Move(before, after, before | after, "") for after in ways if after != before)
         for name, sensor in laws.model.sensors.items():
             if sensor.occupied == station and (sensor.may_flicker or sensor.may_linger):
                 bit = self._bit(f"{PLANT}.{name}.sensor" if f"{PLANT}.{name}.sensor" in self.index else name)

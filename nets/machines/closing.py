@@ -19,8 +19,7 @@ machine has none there, but that a time passes where there is a token. So each r
 run of the open net: what never happens with gates free never happens here. The converse fails, which is the point. An
 arbiter is left out, as from every verdict on what can happen.
 
-A sensor that is exact is no place: it is true iff its station is not empty, or holds a workpiece that was found good,
-or was not. One that may flicker or linger is a bit of
+A sensor that is exact is no place: it is true iff its station is not empty. One that may flicker or linger is a bit of
 its own. A failure is a place for each machine: while it is marked nothing that the machine is at gets done.
 
 Rejected: a place for each command on its way to the machine, which the machine then takes. That needs no variants, but
@@ -217,8 +216,6 @@ class _Closing:
         """The place that shows a sensor, and whether a token means 1."""
         if name in self.inexact or name in self.keys:
             return self.bit(name).name, True
-        if (sensor := self.model.sensors.get(name)) is not None and sensor.judges is not None:
-            return self.laws.verdict(sensor.judges, good=sensor.passes is not None), True
         return (self.reality(name), False) if name in self.model.sensors else (name, True)
 
     def reality(self, sensor: str) -> str:
@@ -355,7 +352,7 @@ class _Closing:
 
     def workpieces(self, start: list[Moment]) -> Iterator[Transition]:
         entry, exit_ = self.model.arrivals.station, self.model.departures.station
-        arrived = chain.from_iterable(map(self.seen, each(start, self.laws.arrives())))
+        arrived = chain.from_iterable(map(self.seen, each(start, [self.laws.arrives()])))
         yield from self.named(f"arrives/{entry}", f"a workpiece comes to {entry}", arrived)
         gone = chain.from_iterable(map(self.seen, each(start, self.laws.departs())))
         yield from self.named(f"leaves/{exit_}", f"the workpiece on {exit_} is taken away", gone)

@@ -12,9 +12,7 @@ lies any time. A stop at once leaves undone what the machine is at. One that las
 has come to rest that may still have its effect, unacknowledged, or end in its accident.
 
 Workpieces are told apart by one bit, whether they were machined; simulation has identities, which would make the number
-of markings grow with the number of workpieces and which no law asks for. On a station that a sensor judges by `passes`
-or `fails` a workpiece has been found good or not, from the firing in which it comes there to that in which it leaves;
-which of the two nobody knows, so each firing in which it is judged is two.
+of markings grow with the number of workpieces and which no law asks for.
 """
 
 from __future__ import annotations
@@ -78,11 +76,6 @@ class Laws:
             if isinstance(action, (Clamp, Process, Release))
         )
 
-    @cached_property
-    def judged(self) -> frozenset[str]:
-        """The stations where a workpiece is found good, or not."""
-        return frozenset(sensor.judges for sensor in self.model.sensors.values() if sensor.judges is not None)
-
     def machine(self, place: Place) -> tuple[str, Machine]:
         """The machine that a place commands."""
         name = _command(place).machine
@@ -141,10 +134,6 @@ class Laws:
         """The place that says that the workpiece on a station is clamped."""
         return f"{PLANT}.{station}.clamped"
 
-    def verdict(self, station: str, *, good: bool) -> str:
-        """The place that says that the workpiece on a station was found good, or that it was not."""
-        return f"{PLANT}.{station}.{'passes' if good else 'fails'}"
-
     def places(self) -> Iterator[Place]:
         """The places of machines and stations, as they are when all is at rest and no workpiece has come."""
 
@@ -177,9 +166,6 @@ class Laws:
             yield from holding(station)
             if station in self.clamps:
                 yield fact(self.clamped(station), f"the workpiece on {station} is clamped")
-            if station in self.judged:
-                yield fact(self.verdict(station, good=True), f"the workpiece on {station} was found good")
-                yield fact(self.verdict(station, good=False), f"the workpiece on {station} was not found good")
         yield fact(OVERRUN, "a machine was given a command while it was at another")
         yield fact(ACCIDENT, "something happened that must not")
 
@@ -199,7 +185,9 @@ class Laws:
             case Put():
                 yield Case((*free, (self._hand(place), True), (self.empty(name), False)), taken)
             case Carry(source=source):
-                yield from (Case(free, taken).with_(moved) for moved in self._moved(source, name))
+                for kind in self.kinds:
+                    moved = self._moved(source, name, kind)
+                    yield Case((*free, *moved[0]), (*taken, *moved[1]), self._tag(kind))
                 yield Case((*free, (self.empty(name), False)), taken, "goes-on", f"{name} still has its workpiece")
             case Process(station=station):
                 yield Case((*free, (self.clamped(station), True), (self.has(station, _RAW), True)), taken)
@@ -313,21 +301,24 @@ class Laws:
             case Grasp():
                 if (station := self._station(place)) is not None:
                     loose = ((self.clamped(station), False),) if station in self.clamps else ()
-                    yield from (Case(loose).with_(moved) for moved in self._moved(station, name))
+                    for kind in self.kinds:
+                        wants, leaves = self._moved(station, name, kind)
+                        yield Case((*loose, *wants), leaves, self._tag(kind))
             case Put():
                 if (station := self._station(place)) is not None:
-                    yield from self._moved(name, station)
+                    for kind in self.kinds:
+                        yield Case(*self._moved(name, station, kind), self._tag(kind))
             case Carry(target=target):
-                yield from self._moved(name, target)
+                for kind in self.kinds:
+                    yield Case(*self._moved(name, target, kind), self._tag(kind))
             case Clamp(station=station):
                 fixed, lies = self.clamped(station), (self.empty(station), False)
                 yield Case(((fixed, False), lies), ((fixed, True),))
                 yield Case(((fixed, True), lies), tag="again")
             case Process(station=station):
                 raw, machined = self.has(station, _RAW), self.has(station, _MACHINED)
-                for anew in self._judged_anew(station):
-                    yield Case(((raw, True), (machined, False)), ((raw, False), (machined, True))).with_(anew)
-                    yield Case(((machined, True),), tag="again").with_(anew)
+                yield Case(((raw, True), (machined, False)), ((raw, False), (machined, True)))
+                yield Case(((machined, True),), tag="again")
             case Release(station=station):
                 fixed = self.clamped(station)
                 yield Case(((fixed, True),), ((fixed, False),))
@@ -367,19 +358,17 @@ class Laws:
             case Move() | Release() | Work() | Stop():
                 return
 
-    def arrives(self) -> Iterator[Case]:
+    def arrives(self) -> Case:
         """A workpiece comes."""
         station = self.model.arrivals.station
         raw, empty = self.has(station, _RAW), self.empty(station)
-        came = Case(((empty, True), (raw, False)), ((empty, False), (raw, True)))
-        yield from map(came.with_, self._judged(station))
+        return Case(((empty, True), (raw, False)), ((empty, False), (raw, True)))
 
     def departs(self) -> Iterator[Case]:
         """A finished workpiece is taken away."""
         station = self.model.departures.station
         kind, empty = self.has(station, self.kinds[-1]), self.empty(station)
-        gone = Case(((kind, True), (empty, False)), ((kind, False), (empty, True)))
-        yield from map(gone.with_, self._judged_no_more(station))
+        yield Case(((kind, True), (empty, False)), ((kind, False), (empty, True)))
 
     def departs_raw(self) -> Iterator[Case]:
         """The accident that a workpiece leaves which no machine has machined, where one should have."""
@@ -396,47 +385,15 @@ class Laws:
     def _station(self, place: Place) -> str | None:
         return self.machine(place)[1].positions[dict(_command(place).parameters)["at"]]
 
-    def _moved(self, source: str, target: str) -> Iterator[Case]:
-        """A workpiece goes from a station to a machine, or the other way; what a station shows of it comes and goes."""
-        for kind in self.kinds:
-            wants = (
-                (self.has(source, kind), True),
-                (self.empty(source), False),
-                (self.empty(target), True),
-                (self.has(target, kind), False),
-            )
-            moved = Case(wants, tuple((place, not value) for place, value in wants), self._tag(kind))
-            for gone in self._judged_no_more(source):
-                yield from map(moved.with_(gone).with_, self._judged(target))
-
-    def _judged(self, holder: str) -> Iterator[Case]:
-        """A workpiece that comes is judged, where somebody does that: it is good or not."""
-        yield from (self._judgement(holder, None, good) for good in self._verdicts(holder))
-
-    def _judged_no_more(self, holder: str) -> Iterator[Case]:
-        """A workpiece goes, whatever it was found."""
-        yield from (self._judgement(holder, good, None) for good in self._verdicts(holder))
-
-    def _judged_anew(self, holder: str) -> Iterator[Case]:
-        """A workpiece has become another where it lies: whatever it was found, it is good or not."""
-        some = self._verdicts(holder)
-        yield from (self._judgement(holder, was, good) for was in some for good in some)
-
-    def _verdicts(self, holder: str) -> tuple[bool | None, ...]:
-        return (True, False) if holder in self.judged else (None,)
-
-    def _judgement(self, holder: str, was: bool | None, now: bool | None) -> Case:
-        """What the workpiece at a holder is found is one thing before and another after; None where nothing is."""
-        if holder not in self.judged:
-            return Case()
-        passes, fails = self.verdict(holder, good=True), self.verdict(holder, good=False)
-        wants = ((passes, was is True), (fails, was is False))
-        leaves = ((passes, now is True), (fails, now is False))
-        before = {None: "", True: "passed", False: "failed"}[was]
-        after = {None: "", True: "passes", False: "fails"}[now]
-        found = {None: "", True: "is found good", False: "is not found good"}[now]
-        tag = "-".join(filter(None, (holder, before, after)))
-        return Case(wants, leaves, tag, found and f"the workpiece on {holder} {found}")
+    def _moved(self, source: str, target: str, kind: str) -> tuple[tuple[Literal, ...], tuple[Literal, ...]]:
+        """What moving a workpiece wants and leaves."""
+        wants = (
+            (self.has(source, kind), True),
+            (self.empty(source), False),
+            (self.empty(target), True),
+            (self.has(target, kind), False),
+        )
+        return wants, tuple((place, not value) for place, value in wants)
 
     def _tag(self, kind: str) -> str:
         return kind if len(self.kinds) > 1 else ""

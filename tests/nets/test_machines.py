@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from copy import deepcopy
 from pathlib import Path
 
 import pytest
-from support import inspected_cell
-from support.bench_cell import COMMANDS, JUDGED, bench, free_cell
+from support.bench_cell import COMMANDS, bench, free_cell
 from support.examples import seeds
 
 from firable.executor.cell.plant import Plant, PlantFault, PlantReport
@@ -18,8 +17,8 @@ from firable.executor.cell.plant import _Finish as Finish
 from firable.nets.catalogue import catalogue_names, catalogue_net, catalogue_path, catalogue_plant
 from firable.nets.diagnostics import InputError
 from firable.nets.machines.closing import close
-from firable.nets.machines.laws import ACCIDENT, OVERRUN, Laws
-from firable.nets.machines.loop import ClosedLoop, Faults, Sending
+from firable.nets.machines.laws import ACCIDENT, OVERRUN
+from firable.nets.machines.loop import ClosedLoop, Faults
 from firable.nets.machines.moment import NOTHING, Case, each
 from firable.nets.machines.plant_file import PlantModel, parse_plant
 from firable.nets.net import Command, Controller, Net, Place, Signal, SignalKind, Transition
@@ -285,72 +284,6 @@ sensors:
 """
 
 
-# --- Workpieces that are judged
-
-
-def test_a_workpiece_is_found_good_or_not_in_the_firing_in_which_it_comes() -> None:
-    loop = close(inspected_cell.net(), inspected_cell.plant())
-    assert loop.shown["camera.ok"] == ("plant.table.passes", True)
-    assert loop.shown["camera.nok"] == ("plant.table.fails", True)
-    assert "plant.table.fails" in loop.net.transition("reject").permissive
-    good, bad = (loop.net.transition(f"R/done/robot.put/table-{found}") for found in ("passes", "fails"))
-    assert {"plant.table.raw", "plant.table.passes"} < set(good.outputs)
-    assert "plant.table.fails" in good.inhibitive
-    assert {"plant.table.raw", "plant.table.fails"} < set(bad.outputs)
-    assert bad.description == "R PUT at=TABLE is done, the workpiece on table is not found good"
-    gone = [loop.net.transition(f"R/done/robot.take_bad/table-{found}") for found in ("passed", "failed")]
-    assert ["plant.table.passes" in one.inputs for one in gone] == [True, False]
-    assert ["plant.table.fails" in one.inputs for one in gone] == [False, True]
-
-
-def test_whatever_a_workpiece_was_found_it_is_judged_again_when_it_was_machined() -> None:
-    net = close(free_cell(judged=True), bench(judged=JUDGED)).net
-    flips = {
-        name.rpartition("/")[2]: ({*t.inputs, *t.outputs} & {"plant.table.passes", "plant.table.fails"})
-        for name, t in ((t.name, t) for t in net.transitions)
-        if name.startswith("M/done/c.run/table-")
-    }
-    both = {"plant.table.passes", "plant.table.fails"}
-    assert flips == {
-        "table-passed-passes": set(),
-        "table-failed-fails": set(),
-        "table-passed-fails": both,
-        "table-failed-passes": both,
-    }
-
-
-@pytest.mark.parametrize("faults", Faults)
-@pytest.mark.parametrize("sending", Sending)
-def test_one_judgement_stands_as_long_as_a_workpiece_lies_there_and_nothing_changes_it(
-    faults: Faults, sending: Sending
-) -> None:
-    loop = close(inspected_cell.net(), inspected_cell.plant(), faults, sending)
-    empty, passes, fails = (1 << loop.net.place_index[f"plant.table.{word}"] for word in ("empty", "passes", "fails"))
-    player, found, open_ = Player(loop.net), set[int](), [loop.net.initial_marking]
-    seen = set()
-    while open_:
-        marking = open_.pop()
-        assert [bool(marking & bit) for bit in (empty, passes, fails)].count(True) == 1
-        for t in player.firable(marking):
-            after = player.fire(marking, [t])
-            was, now = marking & (empty | passes | fails), after & (empty | passes | fails)
-            seen.add((was, now))
-            if after not in found:
-                found.add(after)
-                open_.append(after)
-    assert seen - {(one, one) for one in (empty, passes, fails)} == {
-        *((empty, passes), (empty, fails), (passes, empty), (fails, empty))
-    }
-
-
-def test_a_judgement_never_makes_a_loop_restless() -> None:
-    loop = close(free_cell(judged=True), bench(judged=JUDGED))
-    verdicts = {f"plant.{station}.{word}" for station in ("entry", "table", "exit") for word in ("passes", "fails")}
-    for t in loop.net.transitions:
-        changed = {*t.inputs, *t.outputs}
-        assert not changed <= verdicts or not changed, t.name
-
-
 # --- The laws are those of the simulated cell
 
 
@@ -361,16 +294,6 @@ class AlwaysInTime(random.Random):
         return 0.0
 
 
-class Told(Plant):
-    """A plant whose cameras find workpieces what they are told to."""
-
-    found: Mapping[str, bool]
-
-    def _judge(self, station: str) -> None:
-        if station in self.likely:
-            self.found_good[station] = self.found[station]
-
-
 class Twin:
     """A loop and a simulated plant that are led through the same events."""
 
@@ -378,10 +301,8 @@ class Twin:
         self.net, self.loop = net, close(net, model)
         self.player, self.marking = Player(self.loop.net), self.loop.net.initial_marking
         self.own = {variant: name for name, some in self.loop.variants.items() for variant in some}
-        self.plant = Told(model, workpieces=10_000)
+        self.plant = Plant(model, workpieces=10_000)
         self.plant.random = AlwaysInTime()
-        self.judged = sorted(Laws(model, net).judged)
-        self.plant.found = dict.fromkeys(self.judged, False)
 
     def holds(self, place: str) -> bool:
         return bool(self.marking >> self.loop.net.place_index[place] & 1)
@@ -389,7 +310,6 @@ class Twin:
     def fire(self, t: int) -> None:
         name = self.loop.net.transitions[t].name
         self.marking = self.player.fire(self.marking, [t])
-        self.plant.found = {station: self.holds(f"plant.{station}.passes") for station in self.judged}
         reports = self.simulate(name)
         faults = [report for report in reports if isinstance(report, PlantFault)]
         assert bool(faults) == (name in self.loop.accidents), (name, reports)
@@ -459,24 +379,15 @@ class Twin:
                 assert fact not in self.loop.net.place_index or not self.holds(fact) or place.name == broken_off
             if machine.position is not None:
                 assert self.holds(f"plant.{name}.hand_at.{machine.position}")
-        for station in self.judged:
-            found = self.plant.found_good.get(station)
-            shown = {good: self.holds(f"plant.{station}.{word}") for good, word in ((True, "passes"), (False, "fails"))}
-            assert shown == {True: found is True, False: found is False}
-        for name, sensor in self.plant.model.sensors.items():
-            shows, means = self.loop.shown[name]
-            is_exact = shows != name and not (sensor.may_flicker or sensor.may_linger)
-            assert not is_exact or (self.holds(shows) == means) == self.plant._sees(name, sensor)
         for station in ("table",):
             assert self.holds(f"plant.{station}.clamped") == (station in self.plant.clamped)
 
 
 @pytest.mark.seeds
 @pytest.mark.parametrize("seed", seeds(20))
-@pytest.mark.parametrize("judged", ["", JUDGED], ids=["", "judged"])
-def test_the_loop_and_the_simulated_cell_obey_the_same_laws(seed: int, judged: str) -> None:
+def test_the_loop_and_the_simulated_cell_obey_the_same_laws(seed: int) -> None:
     draw = random.Random(seed)
-    twin = Twin(free_cell(judged=bool(judged)), bench(judged=judged))
+    twin = Twin(free_cell(), bench())
     for _ in range(60):
         choices = twin.player.firable(twin.marking)
         # Accidents end a walk, so they are left for the end, where one is seen to happen in both.
@@ -495,9 +406,8 @@ def test_the_loop_and_the_simulated_cell_obey_the_same_laws(seed: int, judged: s
 def test_a_variant_is_firable_iff_its_transition_is_and_its_gates_are_open(seed: int) -> None:
     draw = random.Random(seed)
     chosen = tuple(draw.sample(list(COMMANDS), 6))
-    judged = draw.choice(["", JUDGED])
-    net = free_cell(chosen, judged=bool(judged))
-    loop = close(net, bench(draw.choice(["", ", may_flicker: true", ", may_linger: true"]), judged))
+    net = free_cell(chosen)
+    loop = close(net, bench(draw.choice(["", ", may_flicker: true", ", may_linger: true"])))
     player, open_player = Player(loop.net), Player(net)
     marking, mask = loop.net.initial_marking, (1 << len(net.places)) - 1
 
