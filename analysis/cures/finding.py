@@ -297,7 +297,10 @@ class _Search(Generic[S]):
         """Whether a changed net, explored, keeps every transition that fires, and comes into no contact."""
         if net is None:
             return False
-        space = explore(net, budget=self._budget)
+        try:
+            space = explore(net, budget=self._budget)
+        except InputError:  # it has no room
+            return False
         self._explored += space.n_markings
         return space.complete and not space.meet_contact() and self._fired <= _fired(space)
 

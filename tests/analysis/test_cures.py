@@ -15,11 +15,12 @@ from support.lively_nets import lively_net
 from firable.analysis.check import check
 from firable.analysis.cures.finding import explained, with_circle
 from firable.analysis.deadline import Deadline
-from firable.analysis.spaces.reachability import Budget
+from firable.analysis.spaces.reachability import Budget, ReachabilityGraph
 from firable.analysis.spaces.space import StateSpace
 from firable.analysis.temporal.queries import answer
 from firable.nets.catalogue import catalogue_net
 from firable.nets.changes import Arbitration, CapacityPlace, Change, Gate, capacity, changed, free_name
+from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.editing import edits
 from firable.nets.net import Arbiter, Net, Place, Transition
 from firable.nets.printing import format_net, in_file_order
@@ -112,6 +113,14 @@ def test_cures_are_looked_for_in_the_time_of_the_report() -> None:
     over = report.space.until(Deadline.after(0.0))
     assert not any(verdict.cures for verdict in explained(replace(report, space=over)))
     assert any(verdict.cures for verdict in explained(report))
+
+
+def test_a_changed_net_that_has_no_room_is_no_cure_and_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: Any, **__: Any) -> ReachabilityGraph:
+        raise InputError([Diagnostic("F3006", "no room", "")])
+
+    monkeypatch.setattr("firable.analysis.cures.finding.explore", full)
+    assert not _explained(catalogue_net("one_robot_mc_late"))["deadlock-free"].cures
 
 
 def test_all_changes_of_a_cure_make_one_net(monkeypatch: pytest.MonkeyPatch) -> None:
