@@ -156,13 +156,13 @@ def jointly_openable(net: Net, transitions: Iterable[int]) -> bool:
 
 
 def at_odds(net: Net, transitions: Iterable[int]) -> tuple[int, int, str] | None:
-    """Two of these transitions and a signal that one of them wants 1 and the other one 0; None where all agree."""
+    """Two of these transitions and a signal that the first wants 1 and the second 0; None where all agree."""
     wanted: dict[str, tuple[bool, int]] = {}
     for t in transitions:
         for gate in net.transitions[t].external:
             value, by = wanted.setdefault(gate.signal, (gate.wanted, t))
             if value != gate.wanted:
-                return by, t, gate.signal
+                return (by, t, gate.signal) if value else (t, by, gate.signal)
     return None
 
 

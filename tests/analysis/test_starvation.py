@@ -90,11 +90,12 @@ def test_an_arbiter_that_is_offered_names_all_that_compete_there() -> None:
     assert "{among: [t1, t2, t5], by: priority}" in check(net).verdict("effective-conflicts").hint
 
 
-def test_gates_that_cannot_all_be_open_leave_starvation_unknown() -> None:
+@pytest.mark.parametrize(("of_t", "told"), [(True, "t and u"), (False, "u and t")])
+def test_gates_that_cannot_all_be_open_leave_starvation_unknown(of_t: bool, told: str) -> None:
     places = (Place("p", marked=True), Place("q"))
     moves = (
-        Transition("t", ("p",), ("q",), external=(ExternalGate("s"),)),
-        Transition("u", ("p",), ("q",), external=(ExternalGate("s", wanted=False),)),
+        Transition("t", ("p",), ("q",), external=(ExternalGate("s", wanted=of_t),)),
+        Transition("u", ("p",), ("q",), external=(ExternalGate("s", wanted=not of_t),)),
         Transition("v", ("q",), ("p",)),
     )
     net = Net("n", places, moves, (Signal("s"),))
@@ -102,7 +103,7 @@ def test_gates_that_cannot_all_be_open_leave_starvation_unknown() -> None:
         eager_run(net)
     verdict = check(net).verdict("starvation")
     assert verdict.status is Status.UNKNOWN
-    assert verdict.bound == "t and u are firable together, and want the signal 's' 1 and 0"
+    assert verdict.bound == f"{told} are firable together, and want the signal 's' 1 and 0"
     assert (verdict.method, verdict.code) == ("eager run of synchronous steps under the arbiters", "")
 
 
