@@ -20,6 +20,7 @@ place waits until then.
     S/drops, S/returns, S/clears     a sensor that is not exact
     S/pressed, S/released            a key
     S/over             a time limit that somebody reads
+    S/told             a controller is told of a signal that has changed together with another one
 
 Rejected: an explored comparison with the simulated cell, which is exact about times and cannot say that nothing is
 left out.
@@ -51,18 +52,26 @@ class Plant(Things):
         Raises `DiffersError` where two have one name: the one would stand for the other in all that is asked.
         """
         found: dict[str, Happens] = {}
-        for name, happens in self._happenings():
+        by_the_cell = ((name, partial(self.is_news, happens)) for name, happens in self._in_the_cell())
+        by_the_plant = ((name, partial(self.once_all_is_told, happens)) for name, happens in self._in_the_plant())
+        for name, happens in (*by_the_cell, *by_the_plant):
             if name in found:
                 raise DiffersError(f"two things that happen are called '{name}'")
             found[name] = happens
         return found
 
-    def _happenings(self) -> Iterator[tuple[str, Happens]]:
+    def _in_the_cell(self) -> Iterator[tuple[str, Happens]]:
         for t in self.net.transitions:
             yield t.name, partial(self.fires, t)
+        for place in self.commanding if self.sending is Sending.LATE else ():
+            yield f"sent/{place.name}", partial(self.sent_late, place)
+        for timer in self.timers:
+            yield f"{timer}/over", partial(self.over, timer)
+        for name in self.late:
+            yield f"{name}/told", partial(self.told, name)
+
+    def _in_the_plant(self) -> Iterator[tuple[str, Happens]]:
         for place in self.commanding:
-            if self.sending is Sending.LATE:
-                yield f"sent/{place.name}", partial(self.sent_late, place)
             if place.name not in self.stops:
                 yield f"{self.machine_of(place)}/done/{place.name}", partial(self.done, place)
                 yield f"{self.machine_of(place)}/accident/{place.name}", partial(self.spoils, place)
@@ -89,8 +98,50 @@ class Plant(Things):
             ):
                 if may:
                     yield f"{name}/{way}", partial(self.wavers, name, way)
-        for timer in self.timers:
-            yield f"{timer}/over", partial(self.over, timer)
+
+    def once_all_is_told(self, happens: Happens, state: State) -> Iterator[Changes]:
+        """Nothing happens at the machines while a controller is still to be told of what has."""
+        if not any(state[f"news of {name}"] for name in self.late):
+            yield from self.is_news(happens, state)
+
+    def is_news(self, happens: Happens, state: State) -> Iterator[Changes]:
+        """What happens, with what controllers are told of it at once, and what is news to them."""
+        for changes in happens(state):
+            if ACCIDENT in changes or OVERRUN in changes:
+                yield changes
+            else:
+                yield from self.told_at_once(changes, state)
+
+    def told_at_once(self, changes: Changes, state: State) -> Iterator[Changes]:
+        """Of what changes with another signal a controller may be told later; it clears completions by itself."""
+        after = _Overlaid(changes, state)
+        touched = [name for name, thing in self.truths.items() if thing in changes]
+        values = ((name, self.is_true(name, after), self.is_true(name, state)) for name in touched)
+        new = {name: now for name, now, was in values if now != was}
+        late = self.told_late([(name, value) for name, value in new.items() if value or name not in self.completions])
+        if not late <= {*self.late}:
+            raise DiffersError(f"{', '.join(sorted(late - {*self.late}))} may be told late, and was not expected to be")
+        more: Changes = {}
+        for name in new.keys() & {*self.late}:
+            told, news = f"told {name}", f"news of {name}"
+            if state[news]:
+                more[news] = False  # it is again what the controller knows
+            elif name in late:
+                more[news] = True
+            elif bool(state[told]) != new[name]:
+                more[told] = new[name]
+            else:
+                return  # what is no news is known
+        yield changes | more
+
+    def told(self, name: str, state: State) -> Iterator[Changes]:
+        """A controller is told of a signal that has changed, of a completion when the sensors have been told."""
+        if name in self.completions and any(
+            state[f"news of {one}"] for one in self.late if one not in self.completions
+        ):
+            return
+        if state[f"news of {name}"] and bool(state[f"told {name}"]) != (value := self.is_true(name, state)):
+            yield {f"news of {name}": False, f"told {name}": value}
 
     def fires(self, t: Transition, state: State) -> Iterator[Changes]:
         """Eq. (1)-(4), gates as the signals show them, once the commands of what it takes or reads have been sent."""
@@ -347,7 +398,7 @@ class Plant(Things):
         """A time is over, while the token waits for a completion that has not come."""
         place = self.timers[timer]
         unsent = f"unsent {place.name}"
-        waits = state[f"token of {place.name}"] and not state[f"signal {place.completion}"]
+        waits = state[f"token of {place.name}"] and not self.shown(str(place.completion), state)
         if waits and not (unsent in self.things and state[unsent]) and not state[f"signal {timer}"]:
             yield {f"signal {timer}": True}
 

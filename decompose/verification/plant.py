@@ -7,7 +7,7 @@ and the places that the net of the loop has for it are named. What can happen to
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -18,8 +18,10 @@ from firable.nets.machines.plant_file import (
     Carry,
     Clamp,
     Failure,
+    Grasp,
     PlantModel,
     Process,
+    Put,
     Release,
     Sensor,
     Stop,
@@ -70,6 +72,8 @@ class Things:
                 found[f"key {name}"] = {True: name, False: f"plant.{name}.released"}
             elif sensor.may_flicker or sensor.may_linger:
                 found[f"bit {name}"] = {True: f"plant.{name}.sensor" if name in self.completions else name}
+        found |= {f"told {name}": {True: f"plant.{name}.told"} for name in self.late}
+        found |= {f"news of {name}": {True: f"plant.{name}.news"} for name in self.late}
         found |= {f"acknowledged {name}": {True: f"plant.{name}.acknowledged"} for name in self.sensed}
         if self.sending is Sending.LATE:
             found |= {f"unsent {p.name}": {True: f"plant.unsent.{p.name}"} for p in self.commanding}
@@ -240,10 +244,77 @@ class Things:
         assert place.command is not None
         return dict(place.command.parameters)[parameter]
 
+    # --- What controllers are told
+
+    @cached_property
+    def late(self) -> tuple[str, ...]:
+        """The signals that a controller may be told later than another one that has changed with them."""
+        late = {signal for changes in self.changing_together() for signal in self.told_late(changes)}
+        return tuple(signal.name for signal in self.net.signals if signal.name in late)
+
+    def told_late(self, changes: Collection[tuple[str, bool]]) -> set[str]:
+        """Of signals that change to these values: where one's old value and a sensor's new one may open a gate each;
+        then the completion, too, which is told when nothing is news of what sensors show."""
+        read = {(gate.signal, gate.wanted) for t in self.net.transitions for gate in t.external}
+        new = {signal for signal, value in changes if (signal, value) in read and signal not in self.completions}
+        late = {signal for signal, value in changes if (signal, not value) in read and new != new & {signal}}
+        return late | {signal for signal, _ in changes if late and signal in self.completions}
+
+    def changing_together(self) -> Iterator[list[tuple[str, bool]]]:
+        """The signals that may change in one instant, and to what: wherever a workpiece goes."""
+        yield self.seen_of(None, self.model.arrivals.station)
+        yield self.seen_of(self.model.departures.station, None)
+        for place in self.commanding:
+            name, action = self.machine_of(place), self.action(place)
+            completed = [(place.completion, True)] if place.completion is not None else []
+            if isinstance(action, Carry):
+                yield completed + self.seen_of(name, action.target)
+            elif isinstance(action, Grasp | Put):
+                station = self.model.machines[name].positions[self.where(place, "at")]
+                way = (station, name) if isinstance(action, Grasp) else (name, station)
+                yield completed + self.seen_of(*way)
+        for t in self.net.transitions:
+            together: list[tuple[str, bool]] = []
+            for place in self.commanding:
+                if place.name in t.outputs and isinstance(action := self.action(place), Carry):
+                    together += self.seen_of(action.source, self.machine_of(place))
+            yield together
+
+    def seen_of(self, source: str | None, target: str | None) -> list[tuple[str, bool]]:
+        """What sensors that are no completions show at once, of a workpiece that goes."""
+        sees = {
+            name: sensor
+            for name, sensor in self.model.sensors.items()
+            if sensor.acknowledges is None and name not in self.sensed
+        }
+        come = [(name, True) for name, sensor in sees.items() if target in (sensor.occupied, sensor.holding)]
+        gone = [
+            (name, False)
+            for name, sensor in sees.items()
+            if source in (sensor.occupied, sensor.holding) and not sensor.may_linger
+        ]
+        return (come if target is not None else []) + (gone if source is not None else [])
+
     # --- What a signal shows
 
     def shown(self, signal: str, state: State) -> bool:
         """The value of a signal that somebody reads."""
+        if signal in self.late:
+            return bool(state[f"told {signal}"])
+        return self.is_true(signal, state)
+
+    @cached_property
+    def truths(self) -> dict[str, str]:
+        """For each signal, timers apart, the thing that says what it is."""
+        found = {name: f"signal {name}" for name in self.completions}
+        for name, sensor in self.model.sensors.items():
+            if name not in found and any(signal.name == name for signal in self.net.signals):
+                ways = (f"key {name}", f"bit {name}")
+                found[name] = next((thing for thing in ways if thing in self.things), target_of(sensor))
+        return found
+
+    def is_true(self, signal: str, state: State) -> bool:
+        """The value of a signal, whoever has been told of it."""
         if signal in self.completions or signal in self.timers:
             return bool(state[f"signal {signal}"])
         return self.seen(signal, state)

@@ -68,6 +68,7 @@ def _compare_names(plant: Plant, loop: ClosedLoop) -> None:
             bit = plant.things.get(f"key {signal}") or plant.things.get(f"bit {signal}")
             seen = f"has {sensor.occupied or sensor.holding}"
             shown[signal] = (plant.things[seen][None], False) if bit is None else (bit[True], True)
+    shown |= {signal: (plant.things[f"told {signal}"][True], True) for signal in plant.late}
     if dict(loop.shown) != shown:
         raise DiffersError("the places that show the signals are others")
 

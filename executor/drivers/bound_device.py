@@ -387,15 +387,15 @@ class BoundDevice:
         self._tell(*self.image.lost(why))
 
     def _tell(self, changes: Sequence[Change], faults: Sequence[str]) -> None:
-        for signal in self.sensed:
-            reading = self.image.readings[signal]
-            shows = reading.quality is Quality.GOOD and bool(reading.value)
-            if shows != self.driver.completions.shown[signal]:
-                self.driver.formed(signal, self.driver.completions.shows(signal, shows))
         if self.driver.listener is not None and not self.driver.is_stopped:
             for change in changes:
                 if change.signal in self.told and change.signal not in self.sensed:
                     self.driver.listener.signal(change.signal, change.value, None)
+        for signal in self.sensed:  # behind what sensors show, as the loop with the machines has it
+            reading = self.image.readings[signal]
+            shows = reading.quality is Quality.GOOD and bool(reading.value)
+            if shows != self.driver.completions.shown[signal]:
+                self.driver.formed(signal, self.driver.completions.shows(signal, shows))
         if faults:
             several = f"{faults[0]} and {len(faults) - 1} more" if len(faults) > 1 else faults[0]
             self._fault(f"'{several}' cannot be read: {self.image.readings[faults[0]].why}")

@@ -12,7 +12,7 @@ command is to be given anew only a person can say, so it is unknown.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 
 from firable.executor.cell.cell_log import CellLog
 from firable.executor.cell.plant import CommandDone, Plant, PlantFault, PlantReport, SensorChanged
@@ -216,7 +216,7 @@ class SimulatedDriver:
         self._tell(at_seconds, sent)
 
     def _tell(self, at_seconds: float, reports: list[PlantReport]) -> None:
-        for report in reports:
+        for report in _completions_last(reports, self.sensors):
             match report:
                 case SensorChanged(signal, value):
                     self._sensor(at_seconds, signal, value)
@@ -239,3 +239,17 @@ class SimulatedDriver:
     def _formed(self, signal: str, entry: int | None) -> None:
         if entry is not None:
             self.listener.signal(signal, value=True, entry=entry)
+
+
+def _completions_last(reports: Iterable[PlantReport], sensors: Collection[str]) -> Iterator[PlantReport]:
+    """The reports as they are told: of what is seen together, completions are formed behind what sensors show."""
+    forming: list[PlantReport] = []
+    for report in reports:
+        if isinstance(report, SensorChanged) and report.signal not in sensors:
+            forming.append(report)
+            continue
+        if not isinstance(report, SensorChanged):
+            yield from forming
+            forming.clear()
+        yield report
+    yield from forming

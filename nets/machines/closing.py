@@ -40,6 +40,7 @@ from firable.nets.machines.laws import ACCIDENT, OVERRUN, PLANT, UNSENT, Laws, f
 from firable.nets.machines.loop import ClosedLoop, Faults, Sending
 from firable.nets.machines.moment import NOTHING, Case, Literal, Moment, each
 from firable.nets.machines.plant_file import Failure, PlantModel, Stop, misfits
+from firable.nets.machines.telling import Telling
 from firable.nets.net import Controller, Net, Place, SignalKind, Transition
 from firable.nets.yaml_tree import Path
 
@@ -77,10 +78,15 @@ class _Closing:
         self.timers = self.timers_read()
         self.keys = [name for name, sensor in model.sensors.items() if sensor.acknowledges is not None]
         self.acknowledged = {name: f"{PLANT}.{name}.acknowledged" for name in completions if name in model.sensors}
-        self.shown = {
+        truth = {
             signal.name: (signal.name, True) if signal.name in self.sharing else self.sensor(signal.name)
             for signal in net.signals
-            if signal.kind is not SignalKind.TIMER or signal.name in self.timers
+            if signal.kind is not SignalKind.TIMER
+        }
+        self.telling = Telling(self.laws, truth)
+        self.shown = {
+            **{name: self.telling.shown(name) for name in truth},
+            **{timer: (timer, True) for timer in self.timers},
         }
         self.failing = self.may_fail(faults)
         self.repaired = faults is Faults.REPAIRED
@@ -198,6 +204,7 @@ class _Closing:
             yield fact(acknowledged, f"the command of {name} is acknowledged, and its sensor does not show it yet")
         for name, unsent in self.unsent.items():
             yield fact(unsent, f"{self.net.place(name).command} is still to be sent")
+        yield from self.telling.places()
         yield from self.laws.places()
         for name, failed in self.failed.items():
             yield fact(failed, f"{name} has failed")
@@ -253,7 +260,7 @@ class _Closing:
             commanded.add(place.command.machine)
             if len(moments) + len(ended) > VARIANTS_MAX:
                 raise _too_many(transition)
-        for moment in chain.from_iterable(map(self.seen, moments)):
+        for moment in chain.from_iterable(map(self.telling.of, chain.from_iterable(map(self.seen, moments)))):
             yield moment.transition("/".join((transition.name, *moment.tags)), _told(transition, moment))
         for moment in ended:
             yield self.accident("/".join((transition.name, *moment.tags)), _told(transition, moment), moment)
@@ -296,8 +303,8 @@ class _Closing:
 
     def moves(self) -> Iterator[Transition]:
         """What machines, workpieces and sensors do by themselves."""
-        calm = Case(((ACCIDENT, False), (OVERRUN, False)))
-        start = each([NOTHING], [calm])
+        calm = each([NOTHING], [Case(((ACCIDENT, False), (OVERRUN, False)))])
+        start = each(calm, [self.telling.all_told])
         for place in self.laws.commanding:
             if not self.laws.lasts(place):
                 continue
@@ -328,7 +335,9 @@ class _Closing:
         for signal, waiting in self.acknowledged.items():
             shows = Case(((waiting, True), (signal, False), self.sensor(signal)), ((waiting, False), (signal, True)))
             yield from self.named(f"{signal}/shown", f"the sensor of {signal} shows it", each(start, [shows]))
-        yield from self.sent_late(start)
+        yield from self.sent_late(calm)
+        for name, words, ways in self.telling.moves():
+            yield from self.named(name, words, each(calm, ways))
         yield from self.workpieces(start)
         yield from self.unsteady(start)
 
@@ -385,14 +394,15 @@ class _Closing:
     def times(self) -> Iterator[Transition]:
         """Any time can be over while a token waits for a completion that has not come: nothing is known of times."""
         for timer, place in self.timers.items():
-            waits = ((place.name, True), (str(place.completion), False), (ACCIDENT, False), (OVERRUN, False))
+            completion, means = self.shown[str(place.completion)]
+            waits = ((place.name, True), (completion, not means), (ACCIDENT, False), (OVERRUN, False))
             sent = ((self.unsent[place.name], False),) if place.name in self.unsent else ()
             over = Case((*waits, *sent, (timer, False)), ((timer, True),))
             words = f"the time of {place.name} is over, and {place.completion} has not come"
             yield from self.named(f"{timer}/over", words, each([NOTHING], [over]))
 
     def named(self, name: str, description: str, moments: Iterable[Moment]) -> Iterator[Transition]:
-        for moment in moments:
+        for moment in chain.from_iterable(map(self.telling.of, moments)):
             yield moment.transition("/".join((name, *moment.tags)), ", ".join((description, *moment.says)))
 
     def ended(self, name: str, moments: Iterable[Moment]) -> Iterator[Transition]:

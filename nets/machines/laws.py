@@ -299,13 +299,13 @@ class Laws:
                             ((here, True), (there, False)), ((here, False), (there, True)), tag=f"from-{position}"
                         )
             case Grasp():
-                if (station := self._station(place)) is not None:
+                if (station := self.station(place)) is not None:
                     loose = ((self.clamped(station), False),) if station in self.clamps else ()
                     for kind in self.kinds:
                         wants, leaves = self._moved(station, name, kind)
                         yield Case((*loose, *wants), leaves, self._tag(kind))
             case Put():
-                if (station := self._station(place)) is not None:
+                if (station := self.station(place)) is not None:
                     for kind in self.kinds:
                         yield Case(*self._moved(name, station, kind), self._tag(kind))
             case Carry(target=target):
@@ -333,7 +333,7 @@ class Laws:
         name, _ = self.machine(place)
         match self.action(place):
             case Grasp():
-                station = self._station(place)
+                station = self.station(place)
                 if station is None:
                     yield self._accident((), "nothing", f"{name} grasps where no workpiece can lie")
                     return
@@ -344,7 +344,7 @@ class Laws:
                 words = f"{name} grasps at {station}, where no workpiece lies"
                 yield self._accident(((self.empty(station), True),), "nothing", words)
             case Put(when_full=when_full):
-                station = self._station(place)
+                station = self.station(place)
                 if station is None:
                     yield self._accident((), "drops", f"{name} drops its workpiece where nothing is")
                 elif when_full == "collide":
@@ -382,7 +382,8 @@ class Laws:
         parameter = "to" if isinstance(self.action(place), Move) else "at"
         return self.hand_at(self.machine(place)[0], dict(_command(place).parameters)[parameter])
 
-    def _station(self, place: Place) -> str | None:
+    def station(self, place: Place) -> str | None:
+        """The station that the command of a place grasps or puts at; None where its position is none."""
         return self.machine(place)[1].positions[dict(_command(place).parameters)["at"]]
 
     def _moved(self, source: str, target: str, kind: str) -> tuple[tuple[Literal, ...], tuple[Literal, ...]]:

@@ -9,6 +9,7 @@ from functools import cache
 from typing import Any
 
 import pytest
+from support.together_cell import belts, together
 
 from firable.decompose.verification import same_loop
 from firable.decompose.verification.happenings import Plant
@@ -22,6 +23,7 @@ from firable.nets.machines.laws import Laws
 from firable.nets.machines.loop import ClosedLoop, Faults, Sending
 from firable.nets.machines.moment import Case
 from firable.nets.machines.plant_file import PlantModel, parse_plant
+from firable.nets.machines.telling import Telling
 from firable.nets.net import Net, Place, Transition
 from firable.nets.text import parse_net
 
@@ -445,6 +447,38 @@ def test_a_place_of_the_net_may_bear_any_name_that_the_plant_does_not() -> None:
     assert set(Plant(net, model).thing_of) == {place.name for place in loop.net.places}
 
 
+@pytest.mark.parametrize("faults", Faults)
+@pytest.mark.parametrize("sending", Sending)
+@pytest.mark.parametrize("extra", ["", ", may_flicker: true", ", may_linger: true"])
+def test_signals_that_change_together_are_read_twice_too(extra: str, sending: Sending, faults: Faults) -> None:
+    for net, model in (together(), belts(extra)):
+        plant = Plant(net, model, sending, faults)
+        assert set(plant.late) == {name for name in plant.truths if f"{name}/told" in plant.happenings}
+        assert {"robot.holds", "belt.on_it"} & {*plant.late}
+        compare(plant, close(net, model, faults, sending))
+
+
+@pytest.mark.parametrize(
+    ("what", "instead"),
+    [
+        ("told_late", lambda *_: frozenset()),
+        ("told_late", lambda self, changes: frozenset(name for name, _ in changes if name not in self.completions)),
+        ("all_told", Case()),
+        ("of", lambda _, moment: [moment]),
+        ("moves", lambda _: iter(())),
+        ("wanted", frozenset({("belt.entry", True), ("belt.on_it", True)})),
+        ("completions", frozenset()),
+    ],
+)
+def test_a_loop_that_tells_otherwise_is_refused(what: str, instead: object, monkeypatch: pytest.MonkeyPatch) -> None:
+    net, model = belts()
+    monkeypatch.setattr(Telling, what, instead)
+    for sending in Sending:
+        loop = close(net, model, sending=sending)
+        with pytest.raises(DiffersError):
+            compare(Plant(net, model, sending), loop)
+
+
 HANG = """
 firable: 1
 cell: hang
@@ -452,7 +486,7 @@ controllers:
   sys: {coordinator: true}
   a: {start: p, inputs: [s1, s2], places: {p: , q: }}
 transitions:
-  arrives/CV1: {from: a.p, to: a.q, if: a.s1, unless: a.s2}
+  a.s1/told: {from: a.p, to: a.q, if: a.s1, unless: a.s2}
   back: {from: a.q, to: a.p}
 """
 HANG_PLANT = """
@@ -467,18 +501,17 @@ sensors: {a.s1: {occupied: CV1}, a.s2: {occupied: CV1}}
 
 
 def test_no_transition_of_the_cell_is_taken_for_what_happens_at_a_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The two sensors are never different, so the transition never fires; but workpieces arrive."""
     net, model = parse_net(HANG), parse_plant(HANG_PLANT, "hang.plant.yaml")
-    with pytest.raises(InputError, match="'arrives/CV1' names one of the transitions, and what happens in the plant"):
+    with pytest.raises(InputError, match=r"'a\.s1/told' names one of the transitions, and what happens in the plant"):
         close(net, model)
     monkeypatch.setattr(closing, "_taken", lambda *_: ())
     loop = close(net, model)
-    with pytest.raises(DiffersError, match="two things that happen are called 'arrives/CV1'"):
+    with pytest.raises(DiffersError, match=r"two things that happen are called 'a\.s1/told'"):
         compare(Plant(net, model, Sending.AT_ONCE), loop)
 
 
 def test_a_place_of_the_cell_with_the_name_of_a_place_of_the_plant_is_refused() -> None:
-    renamed = HANG.replace("arrives/CV1:", "go:").replace("  a: {start: p", "  plant: {start: CV1.raw")
+    renamed = HANG.replace("a.s1/told:", "go:").replace("  a: {start: p", "  plant: {start: CV1.raw")
     net = parse_net(renamed.replace("{p: ,", "{CV1.raw: ,").replace("a.p", "plant.CV1.raw").replace("a.", "plant."))
     model = parse_plant(HANG_PLANT.replace("a.s", "plant.s"), "hang.plant.yaml")
     with pytest.raises(InputError, match=r"'plant\.CV1\.raw' would name two things .*: this place .*; and a raw"):

@@ -11,6 +11,7 @@ import io
 from functools import cache
 
 import pytest
+from support.together_cell import together
 
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.disturbances import Disturbance, NeverCompletes
@@ -19,7 +20,9 @@ from firable.executor.operating.situation import State
 from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.machines.closing import close
 from firable.nets.machines.loop import ClosedLoop, Faults, Sending
-from firable.nets.net import Marking
+from firable.nets.machines.plant_file import PlantModel
+from firable.nets.machines.telling import Telling
+from firable.nets.net import Marking, Net
 from firable.semantics.player import Player
 from firable.semantics.trace import Fired, SignalChanged, Trace, parse_trace
 
@@ -32,15 +35,12 @@ def loop_of(cell: str, sending: Sending, faults: Faults = Faults.NONE) -> Closed
 
 
 def trace_of(cell: str, workpieces: int, *disturbances: Disturbance) -> tuple[State, Trace]:
+    return run_of(catalogue_net(cell), catalogue_plant(cell), workpieces, *disturbances)
+
+
+def run_of(net: Net, plant: PlantModel, workpieces: int, *disturbances: Disturbance) -> tuple[State, Trace]:
     stream = io.StringIO()
-    report = execute(
-        split(catalogue_net(cell)),
-        catalogue_plant(cell),
-        workpieces=workpieces,
-        seed=1,
-        trace=stream,
-        disturbances=disturbances,
-    )
+    report = execute(split(net), plant, workpieces=workpieces, seed=1, trace=stream, disturbances=disturbances)
     return report.state, parse_trace(stream.getvalue())
 
 
@@ -87,7 +87,11 @@ class Follower:
 
 
 def follow(cell: str, trace: Trace, sending: Sending = Sending.AT_ONCE, faults: Faults = Faults.NONE) -> int:
-    follower, fired = Follower(loop_of(cell, sending, faults)), 0
+    return followed(loop_of(cell, sending, faults), trace)
+
+
+def followed(loop: ClosedLoop, trace: Trace) -> int:
+    follower, fired = Follower(loop), 0
     for event in trace.events:
         if isinstance(event, Fired):
             for name in event.transitions:
@@ -117,3 +121,21 @@ def test_a_run_with_a_machine_that_never_completes_is_one_of_the_loop_with_fault
     state, trace = trace_of("one_robot", 8, NeverCompletes(machine, command, 2))
     assert state is not State.DONE
     assert follow("one_robot", trace, Sending.AT_ONCE, Faults.FOR_GOOD) > 10
+
+
+@pytest.mark.parametrize("sending", Sending)
+@pytest.mark.parametrize("first", ["entry", "holds"])
+def test_what_a_cell_does_between_two_signals_of_one_instant_is_in_the_loop(
+    first: str, sending: Sending, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A robot that has grasped shows that the entry is empty and then that it holds something, or the other way."""
+    net, plant = together(first)
+    state, trace = run_of(net, plant, 3)
+    fired = [name for event in trace.events if isinstance(event, Fired) for name in event.transitions]
+    assert state is (State.DEADLOCK if first == "entry" else State.DONE)
+    assert ("lost" in fired) == (first == "entry")
+    assert followed(close(net, plant, Faults.NONE, sending), trace) == len(fired)
+    monkeypatch.setattr(Telling, "told_late", lambda *_: frozenset())
+    if first == "entry":
+        with pytest.raises(AssertionError, match="the loop cannot fire lost here"):
+            followed(close(net, plant, Faults.NONE, sending), trace)

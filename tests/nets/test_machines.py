@@ -336,7 +336,7 @@ class Twin:
             return []
         if what == "leaves":
             return self.plant._lawful("", self.departing())
-        if of in {"shown", "clears", "drops", "returns"}:
+        if of.partition("/")[0] in {"shown", "told", "clears", "drops", "returns"}:
             return []
         machine = self.plant.machines[what]
         busy = machine.breaks_off if of.startswith("still-") else machine.busy

@@ -1,0 +1,162 @@
+"""Signals that change in one instant, and controllers that are told of them one after the other.
+
+When a gripper closes, its hand is full, the station empty and the command done, in one firing of the loop. No wire
+shows that at once: a controller is told one signal, may fire, and is told the next. What it does in between is in no
+run in which all change together. So the loop has the moments in between: for a signal that is told *late* one place
+says what its controller was told last, by which its gates go, and another one that there is news of it. It is told in a
+firing of its own, sensors in any order and the completion behind them: when a machine says that it is done, what it did
+can be seen, but for a sensor that may linger. Meanwhile the cell may fire and send commands; nothing happens at the
+machines before all is told, since a signal takes less time than a machine.
+
+Not every signal needs that. Where all that changes opens gates, it may as well be told in the instant itself: who fires
+later for it could have waited; and where all closes gates, who fires before it is told could have fired before the
+instant. A sensor that closes a gate while another opens one must be late: between them both are open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+from firable.nets.machines.laws import PLANT, Laws, fact
+from firable.nets.machines.moment import Case, Literal, Moment, each
+from firable.nets.machines.plant_file import Carry, Grasp, Put
+from firable.nets.net import Place, SignalKind
+
+Change = tuple[str, bool]
+"""A signal, and the value that it changes to."""
+
+_STILL: Final = "still-to-be-told"
+
+
+@dataclass(frozen=True)
+class Telling:
+    """How the signals of a net reach its controllers.
+
+    `truth` has for each signal, timers apart, the place that shows what it is, and whether a token there means 1.
+    """
+
+    laws: Laws
+    truth: Mapping[str, Literal]
+
+    @cached_property
+    def wanted(self) -> frozenset[Change]:
+        """The values that gates want of signals."""
+        return frozenset((gate.signal, gate.wanted) for t in self.laws.net.transitions for gate in t.external)
+
+    @cached_property
+    def completions(self) -> frozenset[str]:
+        """The signals that a controller clears by itself, when it sends the command that will set them."""
+        return frozenset(one.name for one in self.laws.net.signals if one.kind is SignalKind.COMPLETION)
+
+    @cached_property
+    def late(self) -> tuple[str, ...]:
+        """The signals that are told late in some firing, in the order of the net."""
+        found = frozenset[str]().union(*map(self.told_late, self._instants()))
+        return tuple(signal.name for signal in self.laws.net.signals if signal.name in found)
+
+    def told_late(self, changes: Collection[Change]) -> frozenset[str]:
+        """Which of some signals that change together are told late: a gate that each closes may be open together with
+        one that a sensor opens that was told before; and completions behind such sensors."""
+        opening = {signal for signal, value in changes if (signal, value) in self.wanted} - self.completions
+        closing = {signal for signal, value in changes if (signal, not value) in self.wanted}
+        late = {signal for signal in closing if opening - {signal}}
+        return frozenset(late | {signal for signal, _ in changes if signal in self.completions and late})
+
+    def _instants(self) -> Iterator[list[Change]]:
+        """What may change together, in each firing that moves a workpiece."""
+        model = self.laws.model
+        yield list(self._seen(None, model.arrivals.station))
+        yield list(self._seen(model.departures.station, None))
+        for place in self.laws.commanding:
+            name, _ = self.laws.machine(place)
+            done = [] if place.completion is None else [(place.completion, True)]
+            match self.laws.action(place):
+                case Grasp():
+                    yield [*done, *self._seen(self.laws.station(place), name)]
+                case Put():
+                    yield [*done, *self._seen(name, self.laws.station(place))]
+                case Carry(target=target):
+                    yield [*done, *self._seen(name, target)]
+        for transition in self.laws.net.transitions:
+            sent = (self.laws.net.place(name) for name in transition.outputs)
+            taken = ((self.laws.action(one), self.laws.machine(one)[0]) for one in sent if one.command is not None)
+            some = (self._seen(one.source, name) for one, name in taken if isinstance(one, Carry))
+            yield [change for changes in some for change in changes]
+
+    def _seen(self, source: str | None, target: str | None) -> Iterator[Change]:
+        """What sensors see at once of a workpiece that goes from one to the other."""
+        for signal in self.laws.net.signals:
+            sensor = self.laws.model.sensors.get(signal.name)
+            if sensor is None or signal.name in self.completions or sensor.acknowledges is not None:
+                continue
+            sees = sensor.occupied or sensor.holding
+            if sees == target:
+                yield signal.name, True
+            if sees == source and not sensor.may_linger:
+                yield signal.name, False
+
+    # --- Its places and firings
+
+    def shown(self, signal: str) -> Literal:
+        """The place that shows what the controller of a signal knows of it, and whether a token there means 1."""
+        return (_told(signal), True) if signal in self.late else self.truth[signal]
+
+    @property
+    def all_told(self) -> Case:
+        """No controller is still to be told anything."""
+        return Case(tuple((_news(signal), False) for signal in self.late))
+
+    def places(self) -> Iterator[Place]:
+        """What controllers were told of signals that are told late, and of which there is news."""
+        for signal in self.late:
+            yield fact(_told(signal), f"the controller was told that {signal} is 1")
+            yield fact(_news(signal), f"{signal} has changed, and its controller is still to be told")
+
+    def moves(self) -> Iterator[tuple[str, str, tuple[Case, ...]]]:
+        """For each signal that is told late the firing in which it is, its description, and its ways."""
+        for signal in self.late:
+            place, means = self.truth[signal]
+            news, told = _news(signal), _told(signal)
+            before = [other for other in self.late if signal in self.completions and other not in self.completions]
+            wants = ((news, True), *((_news(other), False) for other in before))
+            ways = tuple(
+                Case((*wants, (place, means == value), (told, not value)), ((news, False), (told, value)), word)
+                for value, word in ((True, "rises"), (False, "falls"))
+            )
+            yield f"{signal}/told", f"the controller is told of {signal}", ways
+
+    def of(self, moment: Moment) -> list[Moment]:
+        """A firing with what controllers are told of it in the firing itself; what is told late is news.
+
+        Of what was news already, and changes back, there is nothing more to tell.
+        """
+        changes = dict(self._changes(moment))
+        late = self.told_late([one for one in changes.items() if one[1] or one[0] not in self.completions])
+        moments = [moment]
+        for signal, value in changes.items():
+            if signal not in self.late:
+                continue
+            news, told = _news(signal), _told(signal)
+            at_once = Case(((news, False), (told, not value)), ((told, value),))
+            later = Case(((news, False),), ((news, True),))
+            back = Case(((news, True),), ((news, False),), f"{signal}-{_STILL}")
+            moments = each(moments, [later if signal in late else at_once, back])
+        return moments
+
+    def _changes(self, moment: Moment) -> Iterator[Change]:
+        for signal, (place, means) in self.truth.items():
+            if place in moment.before and moment.before[place] != moment.after[place]:
+                yield signal, moment.after[place] == means
+
+
+def _told(signal: str) -> str:
+    """The place that holds a token iff the controller was told last that a signal is 1."""
+    return f"{PLANT}.{signal}.told"
+
+
+def _news(signal: str) -> str:
+    """The place that holds a token iff a signal has changed since its controller was told."""
+    return f"{PLANT}.{signal}.news"
