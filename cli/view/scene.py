@@ -117,7 +117,7 @@ class Stage:
             if self.net.place(name).completion == signal:
                 scene = self.done(scene, name)
         sensor = self.plant.sensors.get(signal)
-        if sensor is not None and sensor.occupied == self.plant.arrivals.station:
+        if sensor is not None and sensor.station == self.plant.arrivals.station:
             scene = self._arrives(scene, self.plant.arrivals.station)
         return self._held(scene, signal)
 

@@ -2,8 +2,9 @@
 
 The loops of a bundle are made by `firable.nets.machines`, for prover and checker alike. So the checker reads the
 plant file a second time, and not as arcs: here a machine *is at* a command or at none, a hand *is at* a position, a
-station or a hand *has* nothing, a raw or a machined workpiece; and of each thing that can happen it is told, in one
-state, which states may follow. That the net of the loop does the same in every state is compared in `same_loop`.
+station or a hand *has* nothing, a raw or a machined workpiece, one on a station *is judged* good or bad; and of each
+thing that can happen it is told, in one state, which states may follow. That the net of the loop does the same in every
+state is compared in `same_loop`.
 
 The meaning is that of docs/machines.md. Commands are sent in the firing itself, one after the other, or late: each
 controller sends a command some time after the firing that it belongs to, and what reads or takes the token of that
@@ -17,6 +18,7 @@ place waits until then.
     M/fails/P          M, at the command of P, fails, while no other machine has;   M/repaired   it goes on
     S/shown            the sensor of an acknowledged completion shows it
     arrives/E, leaves/E   a workpiece comes, or is taken away
+    X/judged           the workpiece on a station is found good, or not
     S/drops, S/returns, S/clears     a sensor that is not exact
     S/pressed, S/released            a key
     S/over             a time limit that somebody reads
@@ -32,7 +34,17 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 
-from firable.decompose.verification.plant import ACCIDENT, OVERRUN, DiffersError, State, Things, Value, target_of
+from firable.decompose.verification.plant import (
+    ACCIDENT,
+    BAD,
+    GOOD,
+    OVERRUN,
+    DiffersError,
+    State,
+    Things,
+    Value,
+    target_of,
+)
 from firable.nets.machines.loop import Faults, Sending
 from firable.nets.machines.plant_file import Action, Carry, Clamp, Grasp, Move, Process, Put, Release, Stop
 from firable.nets.net import Place, Transition
@@ -87,6 +99,8 @@ class Plant(Things):
             yield f"{name}/shown", partial(self.comes_to_be_shown, name)
         yield f"arrives/{self.model.arrivals.station}", self.arrives
         yield f"leaves/{self.model.departures.station}", self.leaves
+        for station in sorted(self.judged):
+            yield f"{station}/judged", partial(self.judges, station)
         for name, sensor in self.model.sensors.items():
             if sensor.acknowledges is not None:
                 yield f"{name}/pressed", partial(self.pressed, name)
@@ -204,7 +218,8 @@ class Plant(Things):
             yield {at: place.name} if right else {ACCIDENT: True}
         elif isinstance(action, Carry) and state[has] is None:
             there = state[f"has {action.source}"]
-            yield {ACCIDENT: True} if there is None else {at: place.name, has: there, f"has {action.source}": None}
+            taken: Changes = {at: place.name, has: there, f"has {action.source}": None}
+            yield {ACCIDENT: True} if there is None else self.unjudged(taken)
         elif isinstance(action, Process):
             right = bool(state[f"clamped {action.station}"]) and state[f"has {action.station}"] == "raw"
             yield {at: place.name} if right else {ACCIDENT: True}
@@ -259,7 +274,7 @@ class Plant(Things):
                     yield {f"clamped {station}": True}
             case Process(station=station):
                 if state[f"has {station}"] is not None:
-                    yield {f"has {station}": "machined"}
+                    yield self.unjudged({f"has {station}": "machined"})
             case Release(station=station):
                 yield {f"clamped {station}": False}
             case _:
@@ -269,7 +284,19 @@ class Plant(Things):
         """A workpiece goes from one to the other, where there is one, and the other has none."""
         kind = state[f"has {source}"]
         if kind is not None and state[f"has {target}"] is None:
-            yield {f"has {source}": None, f"has {target}": kind}
+            yield self.unjudged({f"has {source}": None, f"has {target}": kind})
+
+    def unjudged(self, changes: Changes) -> Changes:
+        """What is on a station is another thing now, or nothing: nobody has judged it."""
+        stations = {thing.removeprefix("has ") for thing in changes if thing.startswith("has ")}
+        return changes | {f"judged {station}": None for station in stations & self.judged}
+
+    def judges(self, station: str, state: State) -> Iterator[Changes]:
+        """A workpiece that lies there, and was not judged, is good or bad."""
+        judged = f"judged {station}"
+        if state[f"has {station}"] is not None and state[judged] is None:
+            yield {judged: GOOD}
+            yield {judged: BAD}
 
     def spoils(self, place: Place, state: State) -> Iterator[Changes]:
         """What a machine is at ends in an accident."""
@@ -374,7 +401,8 @@ class Plant(Things):
         """A finished workpiece is taken away from the last station; an unfinished one is an accident."""
         last = f"has {self.model.departures.station}"
         if state[last] == self.kinds[-1]:
-            yield from ({last: None, **seen} for seen in self.sensors_see({last: None}, state))
+            gone = self.unjudged({last: None})
+            yield from ({**gone, **seen} for seen in self.sensors_see(gone, state))
         elif state[last] is not None:
             yield {ACCIDENT: True}
 

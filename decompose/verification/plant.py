@@ -1,8 +1,9 @@
 """What there is in a cell with its machines, read from the net and the plant file a second time.
 
 A machine *is at* a command or at none, a hand *is at* a position, a station or a hand *has* nothing, a raw or a
-machined workpiece; a signal, a bit, a clamp are so or not. Each such thing has a name here and one value in each state,
-and the places that the net of the loop has for it are named. What can happen to them is told in `happenings`.
+machined workpiece; what lies on a station *is judged* good or bad where a sensor shows that; a signal, a bit, a clamp
+are so or not. Each such thing has a name here and one value in each state, and the places that the net of the loop has
+for it are named. What can happen to them is told in `happenings`.
 """
 
 from __future__ import annotations
@@ -31,6 +32,8 @@ from firable.nets.net import Net, Place, SignalKind
 
 ACCIDENT: Final = "accident"
 OVERRUN: Final = "overrun"
+GOOD: Final = "good"
+BAD: Final = "bad"
 Value = str | bool | None
 State = Mapping[str, Value]
 
@@ -64,7 +67,8 @@ class Things:
 
     @cached_property
     def things(self) -> dict[str, dict[Value, str]]:
-        """For each thing, the place of the loop that is marked in each value; the value False has none."""
+        """For each thing, the place of the loop that is marked in each value; the value False has none, nor has None
+        of what is judged."""
         found: dict[str, dict[Value, str]] = {f"token of {p.name}": {True: p.name} for p in self.net.places}
         found |= {f"signal {name}": {True: name} for name in (*self.completions, *self.timers)}
         for name, sensor in self.model.sensors.items():
@@ -97,6 +101,8 @@ class Things:
             found[f"has {name}"] = {None: f"plant.{name}.empty"} | lies
             if name in self.clamps:
                 found[f"clamped {name}"] = {True: f"plant.{name}.clamped"}
+            if name in self.judged:
+                found[f"judged {name}"] = {GOOD: f"plant.{name}.passes", BAD: f"plant.{name}.fails"}
         return found | {ACCIDENT: {True: "plant.accident"}, OVERRUN: {True: "plant.overrun"}}
 
     @cached_property
@@ -114,6 +120,8 @@ class Things:
         places = self.things[thing]
         if all(isinstance(value, bool) for value in places):
             return [False, True]
+        if thing.startswith("judged "):
+            return [None, *places]
         never = self.stops if thing.startswith("at ") else ()
         return [value for value in places if value not in never]
 
@@ -121,6 +129,13 @@ class Things:
 
     def ways_to_know(self, thing: str, state: State) -> list[dict[str, Value]]:
         """The values that a thing may have in a state in which it is left open, each with those of what it goes by."""
+        if thing.startswith("judged "):
+            has = thing.replace("judged ", "has ", 1)
+            return [
+                {has: lies, thing: value}
+                for lies in ([state[has]] if has in state else self.values(has))
+                for value in ([None] if lies is None else self.values(thing))
+            ]
         if not thing.startswith("breaks off "):
             return [{thing: value} for value in self.values(thing)]
         at = thing.replace("breaks off ", "at ", 1)
@@ -131,7 +146,8 @@ class Things:
         ]
 
     def assert_exists(self, state: State, changes: Mapping[str, Value]) -> None:
-        """What has changed has one of its values, and nothing is broken off but by a machine at a stop.
+        """What has changed has one of its values; nothing is broken off but by a machine at a stop, and nothing is
+        judged where nothing lies.
 
         Raises `DiffersError` where it is not so: no state is compared in which it is not.
         """
@@ -143,6 +159,12 @@ class Things:
                 continue
             if state[breaks] is not None and not self.comes_to_rest(state[at]):
                 raise DiffersError(f"{machine} breaks off the command of '{state[breaks]}', and is at no stop")
+        for station in self.model.stations:
+            has, judged = f"has {station}", f"judged {station}"
+            if judged not in self.things or changes.keys().isdisjoint((has, judged)):
+                continue
+            if state[has] is None and state[judged] is not None:
+                raise DiffersError(f"nothing lies on {station}, and it was found {state[judged]}")
 
     def comes_to_rest(self, at: Value) -> bool:
         """Whether a machine that is at the command of a place comes to rest."""
@@ -151,7 +173,7 @@ class Things:
     @cached_property
     def start(self) -> State:
         """All is at rest, and no workpiece has come; a token in M0 sends no command."""
-        first: dict[str, Value] = {thing: None if None in self.things[thing] else False for thing in self.things}
+        first: dict[str, Value] = {thing: None if None in self.values(thing) else False for thing in self.things}
         first |= {f"token of {p.name}": p.marked for p in self.net.places}
         return first | {f"hand {name}": m.hand for name, m in self.model.machines.items() if m.hand is not None}
 
@@ -229,6 +251,12 @@ class Things:
         actions = (action for machine in self.model.machines.values() for action in machine.commands.values())
         return {action.station for action in actions if isinstance(action, (Clamp, Release, Process))}
 
+    @cached_property
+    def judged(self) -> set[str]:
+        """The stations of which a sensor shows what passes there, or what fails."""
+        some = (one for sensor in self.model.sensors.values() for one in (sensor.passes, sensor.fails))
+        return {one for one in some if one is not None}
+
     def machine_of(self, place: Place) -> str:
         """The machine that a place commands."""
         assert place.command is not None
@@ -269,6 +297,8 @@ class Things:
             completed = [(place.completion, True)] if place.completion is not None else []
             if isinstance(action, Carry):
                 yield completed + self.seen_of(name, action.target)
+            elif isinstance(action, Process):
+                yield completed + [(name, False) for name in self.judging(action.station)]
             elif isinstance(action, Grasp | Put):
                 station = self.model.machines[name].positions[self.where(place, "at")]
                 way = (station, name) if isinstance(action, Grasp) else (name, station)
@@ -279,6 +309,10 @@ class Things:
                 if place.name in t.outputs and isinstance(action := self.action(place), Carry):
                     together += self.seen_of(action.source, self.machine_of(place))
             yield together
+        for station in sorted(self.judged):
+            found = self.judging(station)
+            yield [(name, True) for name in found if self.model.sensors[name].passes is not None]
+            yield [(name, True) for name in found if self.model.sensors[name].passes is None]
 
     def seen_of(self, source: str | None, target: str | None) -> list[tuple[str, bool]]:
         """What sensors that are no completions show at once, of a workpiece that goes."""
@@ -293,7 +327,13 @@ class Things:
             for name, sensor in sees.items()
             if source in (sensor.occupied, sensor.holding) and not sensor.may_linger
         ]
+        gone += [(name, False) for name in self.judging(source)]
         return (come if target is not None else []) + (gone if source is not None else [])
+
+    def judging(self, station: str | None) -> list[str]:
+        """The sensors that show what the workpiece on a station was found."""
+        sensors = self.model.sensors.items()
+        return [name for name, one in sensors if station is not None and station in (one.passes, one.fails)]
 
     # --- What a signal shows
 
@@ -309,7 +349,7 @@ class Things:
         found = {name: f"signal {name}" for name in self.completions}
         for name, sensor in self.model.sensors.items():
             if name not in found and any(signal.name == name for signal in self.net.signals):
-                ways = (f"key {name}", f"bit {name}")
+                ways = (f"key {name}", f"bit {name}", f"judged {sensor.passes or sensor.fails}")
                 found[name] = next((thing for thing in ways if thing in self.things), target_of(sensor))
         return found
 
@@ -326,9 +366,11 @@ class Things:
             return bool(state[f"key {name}"])
         if sensor.may_flicker or sensor.may_linger:
             return bool(state[f"bit {name}"])
+        if sensor.passes is not None or sensor.fails is not None:
+            return state[f"judged {sensor.passes or sensor.fails}"] == (BAD if sensor.passes is None else GOOD)
         return state[target_of(sensor)] is not None
 
 
 def target_of(sensor: Sensor) -> str:
-    """What a sensor looks at."""
+    """What a sensor that sees whether there is something looks at."""
     return f"has {sensor.occupied or sensor.holding}"

@@ -5,8 +5,8 @@ asked in every state of the things that either of them looks at, and must lead t
 one value at the start, and what happens gives it one, by induction the loop and the reading have the same runs.
 Nothing is explored, so the size of the loop does not matter; what one happening looks at is a dozen things at most.
 
-States that cannot be are left out where `Things` says so: nothing is broken off but by a machine at a stop. It is so at
-the start, and each happening is seen to leave it so.
+States that cannot be are left out where `Things` says so: nothing is broken off but by a machine at a stop, and nothing
+is judged where nothing lies. It is so at the start, and each happening is seen to leave it so.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from firable.decompose.verification.happenings import Plant
-from firable.decompose.verification.plant import ACCIDENT, OVERRUN, DiffersError, UncomparedError, Value
+from firable.decompose.verification.plant import ACCIDENT, BAD, GOOD, OVERRUN, DiffersError, UncomparedError, Value
 from firable.nets.machines.loop import ClosedLoop, Sending
 from firable.nets.net import Transition
 
@@ -65,6 +65,10 @@ def _compare_names(plant: Plant, loop: ClosedLoop) -> None:
     shown = {signal: (plant.things[f"signal {signal}"][True], True) for signal in (*plant.completions, *plant.timers)}
     for signal in (signal.name for signal in plant.net.signals if signal.name not in shown):
         if (sensor := plant.model.sensors.get(signal)) is not None:
+            if sensor.passes is not None or sensor.fails is not None:
+                verdicts = plant.things[f"judged {sensor.passes or sensor.fails}"]
+                shown[signal] = verdicts[GOOD if sensor.passes is not None else BAD], True
+                continue
             bit = plant.things.get(f"key {signal}") or plant.things.get(f"bit {signal}")
             seen = f"has {sensor.occupied or sensor.holding}"
             shown[signal] = (plant.things[seen][None], False) if bit is None else (bit[True], True)

@@ -35,8 +35,8 @@ from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.machines.plant_file import PlantModel
 from firable.nets.source import printable
 
-VERSION: Final = 2
-"""1 had no check values."""
+VERSION: Final = 3
+"""1 had no check values, and 2 was of another cell as soon as plant files could say more."""
 
 PUT_BACK: Final = "put it back, or begin with a new journal: its machines would not be where the journal left them"
 """What to do about a log that is not what it was."""
@@ -56,7 +56,7 @@ class CellLog:
         self.path = Path(path)
         self.check = 0
         """Over all lines so far, the header aside."""
-        digest = hashlib.sha256(repr(plant).encode()).hexdigest()
+        digest = hashlib.sha256(plant.model_dump_json(exclude_defaults=True).encode()).hexdigest()
         head = {
             "firable_cell": VERSION,
             "plant": plant.plant,

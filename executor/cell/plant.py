@@ -18,6 +18,7 @@ from typing import Final
 
 from firable.executor.cell.disturbances import Disturbance, Disturbances, StuckSensor
 from firable.nets.machines.plant_file import (
+    GOOD,
     Action,
     Carry,
     Clamp,
@@ -116,7 +117,16 @@ class _Stick:
     stuck: StuckSensor
 
 
-_Event = _Arrival | _Departure | _Finish | _Press | _Stick
+@dataclass(frozen=True, slots=True)
+class _Look:
+    """A camera has looked long enough at what lies on a station."""
+
+    station: str
+    number: int
+    """Of the looks at that station: one that was begun anew since, or has nothing to see any more, finds nothing."""
+
+
+_Event = _Arrival | _Departure | _Finish | _Press | _Stick | _Look
 
 
 @dataclass(slots=True)
@@ -150,6 +160,16 @@ class Plant:
         self.machines = {name: _MachineNow(machine, machine.hand) for name, machine in model.machines.items()}
         self.stations: dict[str, Workpiece | None] = dict.fromkeys(model.stations)
         self.clamped: set[str] = set()
+        judging = [sensor for sensor in model.sensors.values() if sensor.judges is not None]
+        self.likely = {str(one.judges): GOOD for one in judging}
+        """How likely a workpiece is to be found good, at each station where that is judged."""
+        self.likely |= {str(one.judges): one.good for one in judging if one.good is not None}
+        self.looks = {
+            station: (0, max(one.after_s for one in judging if one.judges == station)) for station in self.likely
+        }
+        """How often a look was begun there or broken off, and how many seconds one takes."""
+        self.found_good: dict[str, bool] = {}
+        """What the workpieces at these were found, where one lies."""
         self.to_come = workpieces
         self.entered = 0
         self.delivered: list[Workpiece] = []
@@ -248,6 +268,9 @@ class Plant:
             case _Press(signal):
                 if self.machines[str(self.model.sensors[signal].acknowledges)].busy is None:
                     self.pressed.add(signal)
+            case _Look(station, number):
+                if number == self.looks[station][0]:
+                    self._find(station)
             case _Stick(stuck):
                 self.befallen.append((stuck, f"{stuck.signal} is stuck at {int(stuck.value)}"))
 
@@ -257,7 +280,7 @@ class Plant:
             self.arrival_due = False
             self.to_come -= 1
             self.entered += 1
-            self.stations[arrivals.station] = Workpiece(self.entered)
+            self._lies(arrivals.station, Workpiece(self.entered))
             if self.to_come:
                 self._in(arrivals.every_s, arrivals.jitter_s, _Arrival())
 
@@ -266,7 +289,7 @@ class Plant:
         workpiece = self.stations[station]
         if workpiece is None:
             return
-        self.stations[station] = None
+        self._gone(station)
         self._wake()
         self.delivered.append(workpiece)
         if not workpiece.processed and any(
@@ -368,6 +391,7 @@ class Plant:
                 self.clamped.add(station)
             case Process(station=station):
                 self._lying(station, f"{name} machines on {station}").processed += 1
+                self._judge(station)
             case Release(station=station):
                 self.clamped.discard(station)
         if (drops := self.disturbances.drops(name, busy.command, machine.times[busy.command])) is not None:
@@ -394,11 +418,36 @@ class Plant:
 
     def _taken(self, station: str | None, doing: str) -> Workpiece:
         workpiece = self._lying(station, doing)
-        self.stations[str(station)] = None
+        self._gone(str(station))
         if station == self.model.arrivals.station:
             self._arrive()
         self._wake()
         return workpiece
+
+    def _lies(self, station: str, workpiece: Workpiece) -> None:
+        self.stations[station] = workpiece
+        self._judge(station)
+
+    def _gone(self, station: str) -> None:
+        self.stations[station] = None
+        self._judge(station)
+
+    def _judge(self, station: str) -> None:
+        """Begin to look at a station where workpieces are judged: one has come, gone, or become another there."""
+        if station not in self.likely:
+            return
+        self.found_good.pop(station, None)
+        number, seconds = self.looks[station]
+        self.looks[station] = number + 1, seconds
+        if self.stations[station] is None:
+            return
+        if seconds:
+            self._in(seconds, 0.0, _Look(station, number + 1))
+        else:
+            self._find(station)
+
+    def _find(self, station: str) -> None:
+        self.found_good[station] = self.random.random() < self.likely[station]
 
     def _wake(self) -> None:
         """Let each machine that waits for a station to become free look again."""
@@ -419,7 +468,7 @@ class Plant:
         if (there := self.stations[station]) is not None:
             raise _FaultError(f"{name} pushes workpiece {workpiece.id} onto {station}, where workpiece {there.id} lies")
         machine.holding = None
-        self.stations[station] = workpiece
+        self._lies(station, workpiece)
         if station == self.model.departures.station:
             self._in(self.model.departures.after_s, 0.0, _Departure())
 
@@ -434,6 +483,8 @@ class Plant:
             return self.stations[sensor.occupied] is not None
         if sensor.acknowledges is not None:
             return name in self.pressed
+        if sensor.judges is not None:
+            return self.found_good.get(sensor.judges) is (sensor.passes is not None)
         return self.machines[str(sensor.holding)].holding is not None
 
     def _seen(self) -> Iterator[PlantReport]:

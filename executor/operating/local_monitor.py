@@ -130,7 +130,7 @@ def _of_one(decomposition: Decomposition, name: str, model: PlantModel, latency_
             sensor = Sensor(occupied=station)
         sensors[signal.name] = sensor
     near = {station for one in own.values() for station in _reached(one)}
-    near |= {sensor.occupied for sensor in sensors.values() if sensor.occupied is not None}
+    near |= {sensor.station for sensor in sensors.values() if sensor.station is not None}
     ends = {model.arrivals.station, model.departures.station}
     # Where workpieces come and go out of reach, that would only multiply what is believed.
     nowhere = "elsewhere"

@@ -30,7 +30,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from firable.executor.operating.watched_loop import REMEMBERED, Move, WatchedLoop, Work
+from firable.executor.operating.watched_loop import REMEMBERED, Look, Move, WatchedLoop, Work
 from firable.nets.machines.plant_file import PlantModel
 from firable.nets.net import Marking, Net
 from firable.semantics.trace import CommandSent, Event, Fired, Noted, SignalChanged, Trace
@@ -75,8 +75,8 @@ class _Demand(NamedTuple):
     subject: str
 
 
-_Demanded = tuple[list[tuple[str, Work]], list[tuple[int, str]]]
-"""The commands that must be done, by their places; the signals that must be taken."""
+_Demanded = tuple[list[tuple[str, Work]], list[tuple[int, str]], list[Look]]
+"""The commands that must be done, by their places; the signals that must be taken; the cameras that must judge."""
 
 _Belief = dict[Marking, tuple[float, ...]]
 """Each marking of the loop with, for each place in `WatchedLoop.timed`, when it last changed there; a signal, without
@@ -238,7 +238,7 @@ class Monitor:
 
     def _demands(self, marking: Marking, since: tuple[float, ...]) -> Iterator[_Demand]:
         """What must have happened by when, if the loop is in this marking."""
-        works, signals = self._demanded(marking)
+        works, signals, looks = self._demanded(marking)
         for place, work in works:
             over = self.sent_seconds.get(place, 0.0) + work.longest_seconds
             if work.waits_while_empty:
@@ -247,6 +247,9 @@ class Monitor:
             yield _Demand(self._excused(over, completion) + self.latency_seconds, place)
         for s, name in signals:
             yield _Demand(self._excused(since[s], name) + self.latency_seconds, name)
+        for look in looks:
+            begun = max(since[i] for i in look.timed)
+            yield _Demand(begun + look.longest_seconds + self.latency_seconds, look.sensor)
 
     def _demanded(self, marking: Marking) -> _Demanded:
         """What must happen in a marking, whenever it came about."""
@@ -262,8 +265,9 @@ class Monitor:
         signals = [(s, name) for s, name in enumerate(self.signals) if shown[s] != self.taken[s]]
         if len(self.demanded_in) >= REMEMBERED:
             self.demanded_in.clear()
-        self.demanded_in[key] = works, signals
-        return works, signals
+        looks = [look for look in self.loop.looks if not marking & look.empty and not marking & look.verdicts]
+        self.demanded_in[key] = works, signals, looks
+        return works, signals, looks
 
     def _look_at_promises(self, at_seconds: float) -> None:
         held = {name for name in self.signals if self.is_held(name)}

@@ -55,6 +55,19 @@ class Work:
     """The place that says that the target is empty, if the command waits for it; no bit where it does not wait."""
 
 
+@dataclass(frozen=True, slots=True)
+class Look:
+    """A camera: what says that nothing lies at its station, that it has judged, and how long that may take."""
+
+    sensor: str
+    """The first that shows what it finds."""
+    empty: Marking
+    verdicts: Marking
+    longest_seconds: float
+    timed: tuple[int, ...]
+    """The indexes in `WatchedLoop.timed` of what begins a look when it changes."""
+
+
 Hidden = list[tuple[tuple[int, ...], tuple[Marking, ...]]]
 """The markings that hidden moves lead to, by the indexes in `WatchedLoop.timed` of the places that these change."""
 
@@ -91,9 +104,13 @@ class WatchedLoop:
         self.shown = tuple((self._bit(place), means) for place, means in map(loop.shown.__getitem__, self.signals))
         """For each signal the place that says what it is, and the value that a token there means."""
         self.work = {place.name: self._work(laws, place.name, loop.at) for place in laws.commanding}
-        waited = dict.fromkeys(work.waits_while_empty for work in self.work.values() if work.waits_while_empty)
-        self.timed = (*(bit for bit, _ in self.shown), *waited)
-        """The places of which it is kept when they last changed: those of the signals, then those waited for."""
+        waited = (work.waits_while_empty for work in self.work.values() if work.waits_while_empty)
+        begun = {station: self._beginning(laws, station) for station in sorted(laws.judged)}
+        others = dict.fromkeys((*waited, *(bit for bits in begun.values() for bit in bits)))
+        self.timed = (*(bit for bit, _ in self.shown), *others)
+        """The places of which it is kept when they last changed: those of the signals, then those waited for, or looked
+        at."""
+        self.looks = tuple(self._look(laws, station, bits) for station, bits in begun.items())
         self._hidden_in: dict[Marking, Hidden] = {}
         self._timed_by: dict[Marking, tuple[int, ...]] = {}
 
@@ -118,9 +135,12 @@ class WatchedLoop:
 
     def _by_others(self, laws: Laws, station: str) -> Iterator[Move]:
         """What machines that are not seen may do at a station: each workpiece comes and goes, each sensor follows."""
-        ways = [self._bit(laws.empty(station)), *(self._bit(laws.has(station, kind)) for kind in laws.kinds)]
+        kinds = [self._bit(laws.has(station, kind)) for kind in laws.kinds]
+        verdicts = (laws.verdict(station, good=good) for good in (True, False) if station in laws.judged)
+        found = [0, *map(self._bit, verdicts)]
+        ways = [self._bit(laws.empty(station)), *(kind | verdict for kind in kinds for verdict in found)]
         for before in ways:
-            yield from (Move(before, after, before | after, "") for after in ways if after != before)
+            yield from (Move(before, after & ~before, before ^ after, "") for after in ways if after != before)
         for name, sensor in laws.model.sensors.items():
             if sensor.occupied == station and (sensor.may_flicker or sensor.may_linger):
                 bit = self._bit(f"{PLANT}.{name}.sensor" if f"{PLANT}.{name}.sensor" in self.index else name)
@@ -138,6 +158,18 @@ class WatchedLoop:
             target = action.target if isinstance(action, Carry) else self._put_at(laws, place)
         waits = self._bit(laws.empty(target)) if target is not None else 0
         return Work(self._bit(at[place]), action.takes_s + action.jitter_s, waits)
+
+    def _beginning(self, laws: Laws, station: str) -> list[Marking]:
+        """The places that change where a workpiece comes, or becomes another and is judged no more."""
+        names = [laws.empty(station), laws.has(station, laws.kinds[0])]
+        return [self._bit(name) for name in (*names, *(laws.verdict(station, good=good) for good in (True, False)))]
+
+    def _look(self, laws: Laws, station: str, begun: Collection[Marking]) -> Look:
+        verdicts = _union(self._bit(laws.verdict(station, good=good)) for good in (True, False))
+        sensors = {name: one for name, one in laws.model.sensors.items() if one.judges == station}
+        longest = max(one.after_s for one in sensors.values())
+        timed = tuple(self.timed.index(bit) for bit in begun)
+        return Look(next(iter(sensors)), self._bit(laws.empty(station)), verdicts, longest, timed)
 
     def _put_at(self, laws: Laws, place: str) -> str | None:
         _, machine = laws.machine(self.net.place(place))

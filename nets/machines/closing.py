@@ -19,8 +19,9 @@ machine has none there, but that a time passes where there is a token. So each r
 run of the open net: what never happens with gates free never happens here. The converse fails, which is the point. An
 arbiter is left out, as from every verdict on what can happen.
 
-A sensor that is exact is no place: it is true iff its station is not empty. One that may flicker or linger is a bit of
-its own. A failure is a place for each machine: while it is marked nothing that the machine is at gets done.
+A sensor that is exact is no place of its own: it is true iff its station is not empty, or has a workpiece that was
+found good, or one that was not; but one that is told late is (`telling.py`). One that may flicker or linger is a bit. A
+failure is a place for each machine: while it is marked nothing that the machine is at gets done.
 
 Rejected: a place for each command on its way to the machine, which the machine then takes. That needs no variants, but
 a second command could overtake the first, which no driver allows, and markings show commands that are neither sent nor
@@ -223,6 +224,8 @@ class _Closing:
         """The place that shows a sensor, and whether a token means 1."""
         if name in self.inexact or name in self.keys:
             return self.bit(name).name, True
+        if (sensor := self.model.sensors.get(name)) is not None and sensor.judges is not None:
+            return self.laws.verdict(sensor.judges, good=sensor.passes is not None), True
         return (self.reality(name), False) if name in self.model.sensors else (name, True)
 
     def reality(self, sensor: str) -> str:
@@ -366,6 +369,9 @@ class _Closing:
         gone = chain.from_iterable(map(self.seen, each(start, self.laws.departs())))
         yield from self.named(f"leaves/{exit_}", f"the workpiece on {exit_} is taken away", gone)
         yield from self.ended(f"leaves/{exit_}", each(start, self.laws.departs_raw()))
+        for station in self.model.stations:
+            judged = each(start, self.laws.judges(station)) if station in self.laws.judged else []
+            yield from self.named(f"{station}/judged", f"the workpiece on {station} is judged", judged)
 
     def unsteady(self, start: list[Moment]) -> Iterator[Transition]:
         """What a sensor that is not exact does by itself."""

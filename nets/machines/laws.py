@@ -12,7 +12,9 @@ lies any time. A stop at once leaves undone what the machine is at. One that las
 has come to rest that may still have its effect, unacknowledged, or end in its accident.
 
 Workpieces are told apart by one bit, whether they were machined; simulation has identities, which would make the number
-of markings grow with the number of workpieces and which no law asks for.
+of markings grow with the number of workpieces and which no law asks for. On a station that a sensor judges by `passes`
+or `fails` a workpiece is found good or not some time after it has come, and anew after it was machined there; which of
+the two nobody knows.
 """
 
 from __future__ import annotations
@@ -76,6 +78,11 @@ class Laws:
             if isinstance(action, (Clamp, Process, Release))
         )
 
+    @cached_property
+    def judged(self) -> frozenset[str]:
+        """The stations where a workpiece is found good, or not."""
+        return frozenset(sensor.judges for sensor in self.model.sensors.values() if sensor.judges is not None)
+
     def machine(self, place: Place) -> tuple[str, Machine]:
         """The machine that a place commands."""
         name = _command(place).machine
@@ -134,6 +141,10 @@ class Laws:
         """The place that says that the workpiece on a station is clamped."""
         return f"{PLANT}.{station}.clamped"
 
+    def verdict(self, station: str, *, good: bool) -> str:
+        """The place that says that the workpiece on a station was found good, or that it was not."""
+        return f"{PLANT}.{station}.{'passes' if good else 'fails'}"
+
     def places(self) -> Iterator[Place]:
         """The places of machines and stations, as they are when all is at rest and no workpiece has come."""
 
@@ -166,6 +177,9 @@ class Laws:
             yield from holding(station)
             if station in self.clamps:
                 yield fact(self.clamped(station), f"the workpiece on {station} is clamped")
+            if station in self.judged:
+                yield fact(self.verdict(station, good=True), f"the workpiece on {station} was found good")
+                yield fact(self.verdict(station, good=False), f"the workpiece on {station} was not found good")
         yield fact(OVERRUN, "a machine was given a command while it was at another")
         yield fact(ACCIDENT, "something happened that must not")
 
@@ -185,9 +199,7 @@ class Laws:
             case Put():
                 yield Case((*free, (self._hand(place), True), (self.empty(name), False)), taken)
             case Carry(source=source):
-                for kind in self.kinds:
-                    moved = self._moved(source, name, kind)
-                    yield Case((*free, *moved[0]), (*taken, *moved[1]), self._tag(kind))
+                yield from (Case(free, taken).with_(moved) for moved in self._moved(source, name))
                 yield Case((*free, (self.empty(name), False)), taken, "goes-on", f"{name} still has its workpiece")
             case Process(station=station):
                 yield Case((*free, (self.clamped(station), True), (self.has(station, _RAW), True)), taken)
@@ -301,24 +313,21 @@ class Laws:
             case Grasp():
                 if (station := self.station(place)) is not None:
                     loose = ((self.clamped(station), False),) if station in self.clamps else ()
-                    for kind in self.kinds:
-                        wants, leaves = self._moved(station, name, kind)
-                        yield Case((*loose, *wants), leaves, self._tag(kind))
+                    yield from (Case(loose).with_(moved) for moved in self._moved(station, name))
             case Put():
                 if (station := self.station(place)) is not None:
-                    for kind in self.kinds:
-                        yield Case(*self._moved(name, station, kind), self._tag(kind))
+                    yield from self._moved(name, station)
             case Carry(target=target):
-                for kind in self.kinds:
-                    yield Case(*self._moved(name, target, kind), self._tag(kind))
+                yield from self._moved(name, target)
             case Clamp(station=station):
                 fixed, lies = self.clamped(station), (self.empty(station), False)
                 yield Case(((fixed, False), lies), ((fixed, True),))
                 yield Case(((fixed, True), lies), tag="again")
             case Process(station=station):
                 raw, machined = self.has(station, _RAW), self.has(station, _MACHINED)
-                yield Case(((raw, True), (machined, False)), ((raw, False), (machined, True)))
-                yield Case(((machined, True),), tag="again")
+                for unjudged in self._judged_no_more(station):
+                    yield Case(((raw, True), (machined, False)), ((raw, False), (machined, True))).with_(unjudged)
+                    yield Case(((machined, True),), tag="again").with_(unjudged)
             case Release(station=station):
                 fixed = self.clamped(station)
                 yield Case(((fixed, True),), ((fixed, False),))
@@ -364,11 +373,19 @@ class Laws:
         raw, empty = self.has(station, _RAW), self.empty(station)
         return Case(((empty, True), (raw, False)), ((empty, False), (raw, True)))
 
+    def judges(self, station: str) -> Iterator[Case]:
+        """A workpiece that lies on a station, and is not judged yet, is found good or not."""
+        verdicts = {good: self.verdict(station, good=good) for good in (True, False)}
+        wants = ((self.empty(station), False), *((verdict, False) for verdict in verdicts.values()))
+        yield Case(wants, ((verdicts[True], True),), "passes", "and is found good")
+        yield Case(wants, ((verdicts[False], True),), "fails", "and is not found good")
+
     def departs(self) -> Iterator[Case]:
         """A finished workpiece is taken away."""
         station = self.model.departures.station
         kind, empty = self.has(station, self.kinds[-1]), self.empty(station)
-        yield Case(((kind, True), (empty, False)), ((kind, False), (empty, True)))
+        gone = Case(((kind, True), (empty, False)), ((kind, False), (empty, True)))
+        yield from map(gone.with_, self._judged_no_more(station))
 
     def departs_raw(self) -> Iterator[Case]:
         """The accident that a workpiece leaves which no machine has machined, where one should have."""
@@ -386,15 +403,27 @@ class Laws:
         """The station that the command of a place grasps or puts at; None where its position is none."""
         return self.machine(place)[1].positions[dict(_command(place).parameters)["at"]]
 
-    def _moved(self, source: str, target: str, kind: str) -> tuple[tuple[Literal, ...], tuple[Literal, ...]]:
-        """What moving a workpiece wants and leaves."""
-        wants = (
-            (self.has(source, kind), True),
-            (self.empty(source), False),
-            (self.empty(target), True),
-            (self.has(target, kind), False),
-        )
-        return wants, tuple((place, not value) for place, value in wants)
+    def _moved(self, source: str, target: str) -> Iterator[Case]:
+        """A workpiece goes from a station to a machine, or the other way; what a station shows of it comes and goes."""
+        for kind in self.kinds:
+            wants = (
+                (self.has(source, kind), True),
+                (self.empty(source), False),
+                (self.empty(target), True),
+                (self.has(target, kind), False),
+            )
+            moved = Case(wants, tuple((place, not value) for place, value in wants), self._tag(kind))
+            yield from map(moved.with_, self._judged_no_more(source))
+
+    def _judged_no_more(self, holder: str) -> Iterator[Case]:
+        """A workpiece goes, or becomes another where it lies, whatever it was found."""
+        if holder not in self.judged:
+            yield Case()
+            return
+        passes, fails = self.verdict(holder, good=True), self.verdict(holder, good=False)
+        yield Case(((passes, False), (fails, False)))
+        yield Case(((passes, True), (fails, False)), ((passes, False),), f"{holder}-passed")
+        yield Case(((passes, False), (fails, True)), ((fails, False),), f"{holder}-failed")
 
     def _tag(self, kind: str) -> str:
         return kind if len(self.kinds) > 1 else ""

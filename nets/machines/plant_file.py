@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from enum import StrEnum
+from math import isclose
 from pathlib import Path as FilePath
 from typing import Annotated, Final, Literal, get_args
 
@@ -48,6 +49,11 @@ def _version(value: object) -> object:
 
 
 Seconds = Annotated[float, BeforeValidator(_number), Field(ge=0, le=1e6, allow_inf_nan=False)]
+Probability = Annotated[float, BeforeValidator(_number), Field(ge=0.0, le=1.0, allow_inf_nan=False)]
+GOOD: Final = 0.9
+"""How often a workpiece is found good in a simulated run, unless the plant file says otherwise."""
+_AGREE: Final = 1e-9
+"""How far two sensors may be apart that say how often: 1 - 0.3 is not 0.7."""
 
 
 class _Model(BaseModel):
@@ -175,7 +181,13 @@ class Departures(_Model):
 
 
 class Sensor(_Model):
-    """What a sensor sees: a workpiece on a station, one in the hand of a machine, or an operator who presses a key.
+    """What a sensor sees: a workpiece on a station, one in the hand of a machine, an operator who presses a key, or
+    whether a workpiece is good.
+
+    A workpiece is judged some time after it has come to a station of which a sensor sees what `passes` or what `fails`,
+    and again when it has been machined there; the judgement stands until then, or until the workpiece leaves. In a
+    simulated run it takes `after_s`, and the sensor sees what comes with the probability `likely`, without it 0.9 for
+    `passes` and 0.1 for `fails`; a model of the machines leaves open when and how it is judged.
 
     One that may flicker can drop while the workpiece is there, and come back; one that may linger can stay for a while
     when the workpiece has gone. A key acknowledges a fault: in a simulated run it is pressed `after_s` after the
@@ -186,9 +198,27 @@ class Sensor(_Model):
     occupied: OptionalName = None
     holding: OptionalName = None
     acknowledges: OptionalName = None
+    passes: OptionalName = None
+    fails: OptionalName = None
+    likely: Annotated[Probability | None, BeforeValidator(given, json_schema_input_type=Probability)] = None
     after_s: Seconds = 0.0
     may_flicker: bool = False
     may_linger: bool = False
+
+    @property
+    def judges(self) -> str | None:
+        """The station whose workpieces it shows the judgement of, if that is what it shows."""
+        return self.passes or self.fails
+
+    @property
+    def station(self) -> str | None:
+        """The station that it looks at, if it looks at one."""
+        return self.occupied or self.judges
+
+    @property
+    def good(self) -> float | None:
+        """How likely it says a workpiece is to be found good, if it says so."""
+        return self.likely if self.likely is None or self.passes is not None else 1 - self.likely
 
 
 class PlantModel(_Model):
@@ -213,6 +243,11 @@ class PlantModel(_Model):
         return _span(*self._read, path) if self._read else None
 
 
+SEEN: Final = (
+    "`occupied: STATION`, `holding: MACHINE`, `acknowledges: MACHINE`, `passes: STATION` or `fails: STATION` "
+    "(a workpiece there was found good, or not)"
+)
+"""What a sensor can see, for who has to write it."""
 _COMMAND: Final = ("machines", "*", "commands", "*")
 SHAPE: Final = Shape(
     "firable_plant",
@@ -309,20 +344,47 @@ def _inconsistencies(model: PlantModel) -> Iterator[tuple[Path, str, str]]:
                 case Clamp(station=at) | Process(station=at) | Release(station=at):
                     yield from station((*inner, "station"), at)
     for name, sensor in model.sensors.items():
-        if sum(seen is not None for seen in (sensor.occupied, sensor.holding, sensor.acknowledges)) != 1:
-            hint = "write `occupied: STATION`, `holding: MACHINE` or `acknowledges: MACHINE`"
-            yield ("sensors", name), "a sensor sees one thing", hint
+        seen = (sensor.occupied, sensor.holding, sensor.acknowledges, sensor.passes, sensor.fails)
+        if sum(one is not None for one in seen) != 1:
+            yield ("sensors", name), "a sensor sees one thing", f"write {SEEN}"
+        if sensor.judges is not None and (sensor.may_flicker or sensor.may_linger):
+            hint = "leave out `may_flicker` and `may_linger`; a sensor with `occupied` can have them"
+            yield ("sensors", name), "a judgement stands until the workpiece leaves", hint
+        if sensor.judges is None and sensor.likely is not None:
+            hint = "`likely` belongs to `passes` and `fails`"
+            yield ("sensors", name, "likely"), "nothing is judged by this sensor", hint
         if sensor.acknowledges is not None and (sensor.may_flicker or sensor.may_linger):
             yield ("sensors", name), "a key is pressed or not", "leave out `may_flicker` and `may_linger`"
-        if sensor.acknowledges is None and sensor.after_s:
-            yield ("sensors", name, "after_s"), "a sensor sees at once", "`after_s` belongs to `acknowledges`"
-        yield from station(("sensors", name, "occupied"), sensor.occupied)
+        if sensor.acknowledges is None and sensor.judges is None and sensor.after_s:
+            hint = "`after_s` belongs to `acknowledges`, `passes` and `fails`"
+            yield ("sensors", name, "after_s"), "a sensor sees at once", hint
+        for where, at in (("occupied", sensor.occupied), ("passes", sensor.passes), ("fails", sensor.fails)):
+            yield from station(("sensors", name, where), at)
         for key, machine_seen in (("holding", sensor.holding), ("acknowledges", sensor.acknowledges)):
             if machine_seen is not None and machine_seen not in model.machines:
                 yield ("sensors", name, key), f"there is no machine '{machine_seen}'", "see `machines`"
         if sensor.holding in model.machines and not model.machines[sensor.holding].holds:
             hint = "a machine with `hand`, or with a command that does `carry`, holds workpieces"
             yield ("sensors", name, "holding"), f"'{sensor.holding}' never holds anything", hint
+    yield from _disagreements(model)
+
+
+def _disagreements(model: PlantModel) -> Iterator[tuple[Path, str, str]]:
+    """Sensors that say of one station how likely a workpiece is to be found good, and say different things."""
+    first: dict[str, tuple[str, float]] = {}
+    for name, sensor in model.sensors.items():
+        if sensor.judges is None or sensor.good is None:
+            continue
+        other, good = first.setdefault(sensor.judges, (name, sensor.good))
+        if not isclose(good, sensor.good, abs_tol=_AGREE):
+            message = f"a workpiece at '{sensor.judges}' is found good with {_share(good)}, as '{other}' says, "
+            message += f"and here with {_share(sensor.good)}"
+            hint = "say it once: there is one judgement of a station, and `likely` of `fails` is that it is not good"
+            yield ("sensors", name, "likely"), message, hint
+
+
+def _share(probability: float) -> str:
+    return f"{round(probability, 9):.9g}"
 
 
 def misfits(model: PlantModel, net: Net) -> tuple[Diagnostic, ...]:
@@ -358,7 +420,9 @@ def _misfits_of_places(model: PlantModel, net: Net) -> Iterator[Diagnostic]:
 def _misfits_of_signals(model: PlantModel, net: Net) -> Iterator[Diagnostic]:
     for signal in net.signals:
         if signal.kind is SignalKind.SENSOR and signal.name not in model.sensors:
-            hint = did_you_mean(signal.name, list(model.sensors)) + "add it to the `sensors` of the plant file"
+            hint = (
+                f"{did_you_mean(signal.name, list(model.sensors))}add it to the `sensors` of the plant file, as {SEEN}"
+            )
             message = f"no sensor of the plant drives '{signal.name}'"
             yield model.misfit(("sensors",), ("signals", signal.name), message, hint)
     for name, sensor in model.sensors.items():

@@ -22,7 +22,7 @@ from typing import Final
 
 from firable.nets.machines.laws import PLANT, Laws, fact
 from firable.nets.machines.moment import Case, Literal, Moment, each
-from firable.nets.machines.plant_file import Carry, Grasp, Put
+from firable.nets.machines.plant_file import Carry, Grasp, Process, Put
 from firable.nets.net import Place, SignalKind
 
 Change = tuple[str, bool]
@@ -80,11 +80,16 @@ class Telling:
                     yield [*done, *self._seen(name, self.laws.station(place))]
                 case Carry(target=target):
                     yield [*done, *self._seen(name, target)]
+                case Process(station=station):
+                    yield [*done, *((signal, False) for signal in self._judging(station))]
         for transition in self.laws.net.transitions:
             sent = (self.laws.net.place(name) for name in transition.outputs)
             taken = ((self.laws.action(one), self.laws.machine(one)[0]) for one in sent if one.command is not None)
             some = (self._seen(one.source, name) for one, name in taken if isinstance(one, Carry))
             yield [change for changes in some for change in changes]
+        for station in model.stations:
+            for good in (True, False):
+                yield [(signal, True) for signal, passes in self._judging(station).items() if passes == good]
 
     def _seen(self, source: str | None, target: str | None) -> Iterator[Change]:
         """What sensors see at once of a workpiece that goes from one to the other."""
@@ -92,11 +97,19 @@ class Telling:
             sensor = self.laws.model.sensors.get(signal.name)
             if sensor is None or signal.name in self.completions or sensor.acknowledges is not None:
                 continue
-            sees = sensor.occupied or sensor.holding
+            sees = sensor.occupied or sensor.holding or ""
             if sees == target:
                 yield signal.name, True
             if sees == source and not sensor.may_linger:
                 yield signal.name, False
+        if source is not None:
+            yield from ((signal, False) for signal in self._judging(source))
+
+    def _judging(self, station: str) -> dict[str, bool]:
+        """The signals that show what a workpiece there was found, and whether that is good."""
+        sensors = self.laws.model.sensors
+        read = (signal.name for signal in self.laws.net.signals if signal.name in sensors)
+        return {name: sensors[name].passes is not None for name in read if sensors[name].judges == station}
 
     # --- Its places and firings
 

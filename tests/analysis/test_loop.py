@@ -7,7 +7,8 @@ from functools import cache
 from random import Random
 
 import pytest
-from support.bench_cell import COMMANDS, PLANT, bench, free_cell
+from support import inspected_cell
+from support.bench_cell import COMMANDS, JUDGED, PLANT, bench, free_cell
 from support.examples import seeds
 
 from firable.analysis.check import check
@@ -19,7 +20,7 @@ from firable.nets.formula import Deadlock, parse_formula
 from firable.nets.machines.closing import close
 from firable.nets.machines.loop import Faults
 from firable.nets.machines.plant_file import PlantModel, parse_plant
-from firable.nets.net import Net, Property, PropertyKind, TemporalProperty
+from firable.nets.net import ExternalGate, Net, Property, PropertyKind, TemporalProperty
 from firable.nets.temporal import Logic, parse_temporal
 from firable.nets.text import parse_net
 from firable.nets.verdict import Status
@@ -258,6 +259,48 @@ machines:
         assert tuple(str(report.verdict(f"loop.property.{one.name}").status) for one in net.properties) == found
 
 
+def test_a_cell_that_a_camera_sends_two_ways_is_judged_both_ways_and_holds_everything() -> None:
+    asked = {
+        "good": (PropertyKind.REACHABLE, "robot.take_good"),
+        "bad": (PropertyKind.REACHABLE, "robot.take_bad"),
+        "rests": (PropertyKind.REACHABLE, "deadlock"),
+    }
+    made = tuple(Property(name, kind, parse_formula(text)) for name, (kind, text) in asked.items())
+    report = check_loop(replace(inspected_cell.net(), properties=made), inspected_cell.plant())
+    verdicts = {one.name: one.status for one in report.verdicts}
+    assert verdicts.pop("loop.property.rests") is Status.VIOLATED, "asked, for a judgement keeps nothing moving"
+    assert set(verdicts.values()) == {Status.PROVED}
+    names = [one.name for one in report.verdicts if not one.holds]
+    assert names == ["loop.property.rests"]
+
+
+@pytest.mark.parametrize("verdict", ["ok", "nok"])
+def test_a_cell_that_forgets_one_judgement_hangs(verdict: str) -> None:
+    t = {"ok": "accept", "nok": "reject"}[verdict]
+    net = inspected_cell.net()
+    net = replace(net, transitions=tuple(one for one in net.transitions if one.name != t))
+    report = check_loop(net, inspected_cell.plant())
+    hangs = report.verdict("loop.deadlock-free")
+    assert hangs.status is Status.VIOLATED
+    assert hangs.witness is not None
+    found = {"ok": "passes", "nok": "fails"}[verdict]
+    assert f"plant.table.{found}" in hangs.witness.marking
+    assert report.verdict("loop.accidents").holds
+
+
+def test_a_cell_that_takes_the_lack_of_one_judgement_for_the_other_is_told_of_an_empty_station() -> None:
+    net = inspected_cell.net()
+    wrong = [
+        replace(t, inputs=("robot.free", "camera.idle"), external=(ExternalGate("camera.nok", wanted=False),))
+        if t.name == "accept"
+        else t
+        for t in net.transitions
+    ]
+    assert (
+        not check_loop(replace(net, transitions=tuple(wrong)), inspected_cell.plant()).verdict("loop.accidents").holds
+    )
+
+
 def test_a_budget_that_ends_leaves_the_loop_unknown() -> None:
     net, plant = catalogue_net("one_robot"), catalogue_plant("one_robot")
     report = check_loop(net, plant, Budget(markings=20, seconds=0.0))
@@ -380,8 +423,9 @@ def test_what_fails_for_good_is_not_said_to_be_repaired() -> None:
 @pytest.mark.seeds
 @pytest.mark.parametrize("seed", seeds(10))
 def test_what_can_never_happen_with_gates_free_never_happens_in_the_loop(seed: int) -> None:
-    net = free_cell(tuple(Random(seed).sample(list(COMMANDS), 4)))
-    report = check_loop(net, bench())
+    judged = ["", JUDGED][seed % 2]
+    net = free_cell(tuple(Random(seed).sample(list(COMMANDS), 4)), judged=bool(judged))
+    report = check_loop(net, bench(judged=judged))
     places = [place.name for place in net.places]
     pairs = [(p, q) for p in places for q in places if p < q]
     asked = [Property(f"x{i}", PropertyKind.NEVER, parse_formula(f"{p} and {q}")) for i, (p, q) in enumerate(pairs)]

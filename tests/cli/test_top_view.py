@@ -86,6 +86,13 @@ def test_a_sensor_shows_that_a_workpiece_has_come_and_only_one() -> None:
     assert scene.pieces == (Piece(1, "cv1_entry"),)
 
 
+@pytest.mark.parametrize("judged", ["passes", "fails"])
+def test_a_camera_shows_that_a_workpiece_has_come_whatever_it_finds(judged: str) -> None:
+    text = PLANTS["one_robot"].read_text("utf-8").replace("{occupied: cv1_entry}", f"{{{judged}: cv1_entry}}")
+    stage = Stage(catalogue_net("one_robot"), parse_plant(text))
+    assert stage.signal(stage.begin(), "conveyor.part_at_entry").pieces == (Piece(1, "cv1_entry"),)
+
+
 def test_a_sensor_of_a_hand_is_believed_after_a_grasp_that_was_given_up() -> None:
     manual = (Path(__file__).parents[2] / "docs" / "time-limits.md").read_text("utf-8")
     net, plant_file = re.findall(r"^```yaml\n(.*?)^```", manual.partition("given twice\n")[2], re.MULTILINE | re.DOTALL)

@@ -72,6 +72,28 @@ def test_a_sensor_that_is_not_exact_breaks_its_assumption(
     assert (place in broken.witness.marking) != means, "and closed after it"
 
 
+@pytest.mark.parametrize(("during", "holds"), [("mc.machining", False), ("mc.release", True)])
+def test_a_judgement_that_machining_changes_after_the_vote_breaks_its_assumption(during: str, holds: bool) -> None:
+    text = (
+        catalogue_path("one_robot").read_text("utf-8").replace("inputs: part_present", "inputs: [part_present, fine]")
+    )
+    seen = text.replace("description: robot free}\n", "description: robot free}\n      seen:\n").replace(
+        "\nproperties:\n",
+        f"  peek: {{from: robot.free, to: robot.seen, if: [{during}, mc.fine]}}\n"
+        "  back: {from: robot.seen, to: robot.free}\n\nproperties:\n",
+    )
+    net = parse_net(seen)
+    plant = plant_with(
+        "robot.touch:            {holding: R}", "robot.touch: {holding: R}\n  mc.fine: {passes: mc_table}"
+    )
+    found = held_gates(split(net), plant)
+    broken = {verdict.name: verdict for verdict in found.verdicts}["o4.peek/mc.fine"]
+    assert broken.holds == holds
+    if not holds:
+        assert broken.witness is not None
+        assert broken.witness.firings[-1] == ("MC/done/mc.machining/mc_table-passed",)
+
+
 def test_a_gate_that_another_machine_closes_is_found() -> None:
     text = catalogue_path("one_robot").read_text("utf-8")
     # The exit is free now: nothing keeps it so until the robot has put its workpiece.

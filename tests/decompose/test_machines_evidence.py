@@ -5,6 +5,7 @@ from functools import cache
 from hashlib import sha256
 
 import pytest
+from support import inspected_cell
 from support.bench_cell import PLANT as BENCH
 from support.bundle_mutants import evidence_mutants, verdict_mutants
 from support.examples import some
@@ -131,6 +132,24 @@ def test_a_bundle_with_its_machines_is_shown() -> None:
         assert checked[f"fault.{machine}.repaired"].verdict.holds
     assert all(checked[name].shown for name in names)
     assert all("closed anew with plant.yaml" in checked[name].method for name in names)
+
+
+@pytest.mark.usefixtures("remembering")
+def test_a_bundle_of_a_cell_with_a_camera_is_shown_and_one_with_another_camera_is_not() -> None:
+    text = inspected_cell.PLANT
+    bundle = make_bundle(check(inspected_cell.net()), plant=text)
+    assert not refused(bundle)
+    holds = {one.name: one.holds for one in bundle.verdicts if one.name.startswith(PREFIXES)}
+    assert [name for name, held in holds.items() if not held] == ["fault.R", "fault.R.places"]
+    assert {"o4.accept/camera.ok", "o4.reject/camera.nok", "loop.property.rests"} < holds.keys()
+    for old, new in (
+        ("{fails: table}", "{occupied: table}"),
+        ("{fails: table}", "{passes: table}"),
+        ("{fails: table}", "{fails: bench}"),
+    ):
+        assert refused(resealed(bundle, text.replace(old, new))), new
+    # How likely what is found is a matter of simulation alone.
+    assert not refused(resealed(bundle, text.replace("likely: 0.6", "likely: 0.7")))
 
 
 WARNED = """\

@@ -9,6 +9,8 @@ from functools import cache
 from typing import Any
 
 import pytest
+from support import inspected_cell
+from support.bench_cell import JUDGED, bench, free_cell
 from support.together_cell import belts, together
 
 from firable.decompose.verification import same_loop
@@ -75,6 +77,8 @@ def other_plants(model: PlantModel, seed: int) -> PlantModel:
             for key in ("may_flicker", "may_linger"):
                 if draw.random() < 0.25:
                     sensor[key] = True
+            if "occupied" in sensor and draw.random() < 0.5 and sensor.keys() == {"occupied"}:
+                sensor[draw.choice(["passes", "fails"])] = sensor.pop("occupied")
     for machine in data["machines"].values():
         for name, action in machine["commands"].items():
             if action["does"] in {"put", "carry"}:
@@ -89,7 +93,7 @@ def other_plants(model: PlantModel, seed: int) -> PlantModel:
 
 
 def test_both_readings_agree_on_plants_of_every_kind() -> None:
-    count = 0
+    count, judged = 0, 0
     for seed in range(24):
         net = catalogue_net(CELLS[seed % len(CELLS)])
         model = other_plants(catalogue_plant(CELLS[seed % len(CELLS)]), seed)
@@ -99,8 +103,33 @@ def test_both_readings_agree_on_plants_of_every_kind() -> None:
         except InputError:
             continue  # a net that the plant does not fit
         count += 1
+        judged += bool(Laws(model, net).judged)
         assert compare(Plant(net, model, sending, faults), loop) > 3 * len(loop.net.transitions)
     assert count > 10
+    assert judged > 5
+
+
+@pytest.mark.parametrize(("sending", "faults"), KINDS)
+def test_both_readings_agree_on_workpieces_that_are_judged_where_they_come_are_machined_and_go(
+    sending: Sending, faults: Faults
+) -> None:
+    for net, model in (
+        (free_cell(judged=True), bench(judged=JUDGED)),
+        (inspected_cell.net(), inspected_cell.plant()),
+    ):
+        loop, plant = close(net, model, faults, sending), Plant(net, model, sending, faults)
+        assert compare(plant, loop) > 3 * len(loop.net.transitions)
+        judged = {f"plant.{at}.{word}" for at in model.stations for word in ("passes", "fails")}
+        groups = by_happening(plant, loop.net.transitions)
+        for name, some in groups.items():
+            for t in some:
+                if judged.isdisjoint((*t.inputs, *t.outputs)) or t.name.endswith("/set-already"):
+                    continue
+                others = [other for other in some if other is not t]
+                mutants = [m for m in changed(t) if judged & ({*m.inputs, *m.outputs} ^ {*t.inputs, *t.outputs})]
+                for wrong in (others, *([mutant, *others] for mutant in mutants)):
+                    with pytest.raises(DiffersError):
+                        pytest.fail(t.name) if compare_one(plant, name, wrong) else None
 
 
 STOPS = """
@@ -360,6 +389,40 @@ def with_move(net: Net, name: str) -> Net:
 
 # --------------------------------------------------------------------------------------------------------------------
 # Mutants of the texts
+
+
+@pytest.mark.parametrize("law", ["judges", "_judged_no_more"])
+def test_a_judgement_that_the_laws_forget_or_take_for_granted_is_found(
+    law: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    net, model, before = free_cell(judged=True), bench(judged=JUDGED), getattr(Laws, law)
+    for spoiled in (lambda *_: iter([Case()]), lambda *of: list(before(*of))[:1], lambda *of: list(before(*of))[1:]):
+        monkeypatch.setattr(Laws, law, spoiled)
+        with pytest.raises(DiffersError):
+            compare(Plant(net, model), close(net, model, sending=Sending.LATE))
+
+
+def test_a_judgement_that_both_readings_keep_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No state is compared in which something is judged where nothing lies: so none may come about."""
+    net, model = free_cell(judged=True), bench(judged=JUDGED)
+    monkeypatch.setattr(Plant, "unjudged", lambda _, changes: changes)
+    monkeypatch.setattr(Laws, "_judged_no_more", lambda *_: iter([Case()]))
+    plant = Plant(net, model)
+    name = f"leaves/{model.departures.station}"
+    some = by_happening(plant, close(net, model, sending=Sending.LATE).net.transitions)[name]
+    with pytest.raises(DiffersError, match=r"nothing lies on exit, and it was found (good|bad)"):
+        compare_one(plant, name, some)
+
+
+def test_cameras_that_are_taken_for_each_other_are_a_difference(monkeypatch: pytest.MonkeyPatch) -> None:
+    net, model, verdict = inspected_cell.net(), inspected_cell.plant(), Laws.verdict
+    loop = close(net, model, sending=Sending.LATE)
+    swapped = {**loop.shown, "camera.ok": loop.shown["camera.nok"], "camera.nok": loop.shown["camera.ok"]}
+    with pytest.raises(DiffersError, match="that show the signals are others"):
+        compare(Plant(net, model), replace(loop, shown=swapped))
+    monkeypatch.setattr(Laws, "verdict", lambda self, station, good: verdict(self, station, good=not good))
+    with pytest.raises(DiffersError, match="that show the signals are others"):
+        compare(Plant(net, model), close(net, model, sending=Sending.LATE))
 
 
 def spoiling(change: Callable[[Case], Case | None]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:

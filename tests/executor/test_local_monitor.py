@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
+from support import inspected_cell
 from support.hosts import Cell, ended_within
 from support.watched_runs import CELLS, run_of, slower
 
@@ -23,7 +25,7 @@ from firable.nets.diagnostics import InputError
 from firable.nets.machines.plant_file import parse_plant
 from firable.nets.text import parse_net
 from firable.semantics.joining import APPLIED
-from firable.semantics.trace import Event, Fired, Noted, Trace
+from firable.semantics.trace import Event, Fired, Noted, SignalChanged, Trace
 
 
 @cache
@@ -72,6 +74,39 @@ def test_machines_that_keep_to_their_plant_file_diverge_at_no_host(cell: str) ->
         assert diverges(cell, names(cell), trace) is None
 
 
+def of_inspection(controllers: list[str], trace: Trace) -> Divergence | None:
+    """What monitors of the cell with a camera find in what hosts of some controllers see of a run."""
+    cell = split(inspected_cell.net())
+    monitor = LocalMonitor(cell, controllers, inspected_cell.plant())
+    assert trace.end is not None
+    parts = {row.name: [part.controller for part in row.parts] for row in cell.coordinated}
+    for event in trace.events:
+        if isinstance(event, Fired) and (own := parts.get(event.transitions[0])) is not None:
+            (t,) = event.transitions
+            for name in (name for name in controllers if name in own):
+                monitor.seen(Noted(event.at_seconds, APPLIED, {"controller": name, "round": 1, "transition": t}))
+        else:
+            monitor.seen(event)
+    monitor.passed(trace.end.at_seconds)
+    return monitor.divergence
+
+
+@pytest.mark.parametrize("controllers", [["robot"], ["camera"], ["robot", "camera"]], ids="-".join)
+def test_a_camera_at_a_station_that_others_reach_may_find_anything_at_any_time(controllers: list[str]) -> None:
+    for seed in range(3):
+        trace = inspected_cell.run(seed)
+        assert of_inspection(controllers, trace) is None
+        flipped = []
+        for event in trace.events:
+            flipped.append(event)
+            if isinstance(event, SignalChanged) and event.signal in OTHER and event.value:
+                at, other = event.at_seconds, OTHER[event.signal]
+                flipped += [SignalChanged(at, event.signal, value=False), SignalChanged(at, other, value=True)]
+                flipped += [SignalChanged(at, other, value=False), SignalChanged(at, event.signal, value=True)]
+        assert of_inspection(controllers, replace(trace, events=tuple(flipped))) is None
+
+
+OTHER = {"camera.ok": "camera.nok", "camera.nok": "camera.ok"}
 OWN: list[tuple[str, Disturbance, str]] = [
     ("robot", NeverCompletes("R", "MOVE", 3), "robot.back"),
     ("robot", StuckSensor("robot.touch", value=False, from_seconds=30.0), "robot.grasp_cv1"),

@@ -9,12 +9,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from support import inspected_cell
+from support.bench_cell import JUDGED, bench, free_cell
 from support.watched_runs import CELLS, run_of, slower
 
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.disturbances import NeverCompletes, StuckSensor
 from firable.executor.operating.conduct import Watch
 from firable.executor.operating.host import Host
+from firable.executor.operating.local_monitor import LocalMonitor
 from firable.executor.operating.monitor import Divergence, Monitor, watch
 from firable.executor.operating.running import RunReport, execute
 from firable.executor.operating.situation import State
@@ -23,7 +26,7 @@ from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.diagnostics import InputError
 from firable.nets.machines.plant_file import parse_plant
 from firable.nets.text import parse_net
-from firable.semantics.trace import CommandSent, Event, SignalChanged, Trace, parse_trace
+from firable.semantics.trace import CommandSent, Event, Fired, SignalChanged, Trace, parse_trace
 
 
 def watched(cell: str, trace: Trace) -> Divergence | None:
@@ -103,6 +106,102 @@ def test_a_completion_may_be_taken_as_late_as_time_jitter_and_latency_say(
     found = monitor.signal(sent + after_seconds, "robot.at_cv1", value=True)
     assert (monitor.divergence is None) == explained
     assert explained or (found is not None and found.subject == "robot.at_cv1")
+
+
+def inspected(trace: Trace) -> Divergence | None:
+    return watch(Monitor(inspected_cell.net(), inspected_cell.plant()), trace)
+
+
+def until_judged(seed: int) -> tuple[list[Event], SignalChanged]:
+    """A run until a workpiece lies before the camera, and what the camera shows."""
+    events = list(inspected_cell.run(seed, workpieces=1).events)
+    where = next(i for i, e in enumerate(events) if isinstance(e, SignalChanged) and e.signal.startswith("camera."))
+    shows = events[where]
+    assert isinstance(shows, SignalChanged)
+    return events[:where], shows
+
+
+OTHER = {"camera.ok": "camera.nok", "camera.nok": "camera.ok"}
+
+
+def test_cameras_that_keep_to_their_plant_file_never_diverge_whatever_they_find() -> None:
+    shown = set()
+    for seed in range(4):
+        trace = inspected_cell.run(seed)
+        assert inspected(trace) is None
+        shown |= {event.signal for event in trace.events if isinstance(event, SignalChanged) and event.value}
+    assert {"camera.ok", "camera.nok"} < shown
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_either_judgement_is_explained_and_one_that_changes_while_the_workpiece_lies_there_is_not(seed: int) -> None:
+    before, shows = until_judged(seed)
+    for signal in OTHER:
+        monitor = Monitor(inspected_cell.net(), inspected_cell.plant())
+        for event in before:
+            assert monitor.seen(event) is None
+        at = shows.at_seconds
+        assert monitor.signal(at, signal, value=True) is None
+        # The workpiece lies there until the robot is told to take it, so it is judged once.
+        found = monitor.signal(at + 0.4, signal, value=False)
+        assert found is not None
+        assert found.subject == signal
+
+    for signal, other in OTHER.items():
+        monitor = Monitor(inspected_cell.net(), inspected_cell.plant())
+        for event in before:
+            assert monitor.seen(event) is None
+        assert monitor.signal(shows.at_seconds, signal, value=True) is None
+        found = monitor.signal(shows.at_seconds + 0.1, other, value=True)
+        assert found is not None
+        assert found.subject == other, "both at once"
+
+
+@pytest.mark.parametrize(("after_seconds", "patience"), [(0.0, 0.9), (3.0, 3.9)])
+def test_a_camera_that_never_judges_is_told_of_when_it_should_have(after_seconds: float, patience: float) -> None:
+    before, shows = until_judged(1)
+    slow = inspected_cell.PLANT.replace("{fails: table}", f"{{fails: table, after_s: {after_seconds}}}")
+    monitor = Monitor(inspected_cell.net(), inspected_cell.plant(slow))
+    for event in before:
+        assert monitor.seen(event) is None
+    assert monitor.signal(shows.at_seconds, "robot.placed", value=True) is None
+    assert monitor.passed(shows.at_seconds + patience) is None
+    found = monitor.passed(shows.at_seconds + patience + 0.5)
+    assert found is not None
+    assert found.subject in OTHER
+
+
+def test_a_camera_whose_judgement_gets_stuck_is_unexplained() -> None:
+    stuck = StuckSensor("camera.nok", value=True, from_seconds=2.0)
+    found = inspected(inspected_cell.run(0, disturbances=[stuck]))
+    assert found is not None
+    assert found.subject == "camera.nok"
+
+
+@pytest.mark.parametrize("is_local", [False, True])
+def test_a_workpiece_that_is_machined_may_be_found_another_than_before(is_local: bool) -> None:
+    net, model = free_cell(("clamp", "run", "to_entry", "belt"), judged=True), bench(judged=JUDGED)
+
+    def monitored(*changes: tuple[float, str, bool]) -> Divergence | None:
+        events: list[Event] = [SignalChanged(0.0, "c.entry", value=True), SignalChanged(0.0, "c.fresh", value=True)]
+        for at, name in ((1.0, "belt"), (6.0, "clamp"), (8.0, "run")):
+            events += [Fired(at, (f"send_{name}",)), CommandSent(at, f"c.{name}")]
+        events += [SignalChanged(1.1, "c.entry", value=False), SignalChanged(1.1, "c.fresh", value=False)]
+        events += [SignalChanged(at, signal, value=value) for at, signal, value in ((5.0, "c.ok", True), *changes)]
+        monitor = LocalMonitor(split(net), ["c"], model) if is_local else Monitor(net, model)
+        for event in sorted(events, key=lambda event: event.at_seconds):
+            monitor.seen(event)
+        return monitor.divergence
+
+    assert monitored() is None
+    assert monitored((11.0, "c.ended", True)) is None, "it may be found as before"
+    assert monitored((11.0, "c.ok", False), (11.1, "c.nok", True), (11.2, "c.ended", True)) is None
+    early = monitored((7.5, "c.ok", False), (7.6, "c.nok", True))
+    assert early is not None
+    assert early.subject == "c.ok"
+    twice = monitored((11.0, "c.ok", False), (11.1, "c.nok", True), (11.2, "c.ended", True), (12.0, "c.ok", True))
+    assert twice is not None
+    assert twice.subject == "c.ok"
 
 
 def test_a_command_that_the_plant_refuses_says_why() -> None:

@@ -3,41 +3,13 @@
 from pathlib import Path
 
 import pytest
+from support.plant_bench import TEXT, Bench
 
-from firable.executor.cell.disturbances import Disturbance, Drops, NeverCompletes, StuckSensor
-from firable.executor.cell.plant import CommandDone, Plant, PlantFault, PlantReport, SensorChanged
+from firable.executor.cell.disturbances import Drops, NeverCompletes, StuckSensor
+from firable.executor.cell.plant import CommandDone, SensorChanged
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.diagnostics import InputError
-from firable.nets.machines.plant_file import PlantModel, misfits, parse_plant, read_plant
-
-TEXT = """\
-firable_plant: 1
-plant: bench
-stations: [entry, table, exit]
-arrivals:   {station: entry, every_s: 5}
-departures: {station: exit, after_s: 1}
-machines:
-  R:
-    hand: HOME
-    positions: {HOME: , ENTRY: entry, TABLE: table, EXIT: exit}
-    commands:
-      MOVE:  {does: move, takes_s: 2}
-      GRASP: {does: grasp, takes_s: 1}
-      PUT:   {does: put, takes_s: 1}
-      HOLD:  {does: put, takes_s: 1, when_full: wait}
-  M:
-    commands:
-      CLAMP:   {does: clamp, station: table, takes_s: 1}
-      RUN:     {does: process, station: table, takes_s: 3}
-      UNCLAMP: {does: release, station: table, takes_s: 1}
-  B:
-    commands:
-      RUN:  {does: carry, from: entry, to: table, takes_s: 4}
-      STOP: {does: stop}
-sensors:
-  entry: {occupied: entry}
-  hand:  {holding: R}
-"""
+from firable.nets.machines.plant_file import misfits, parse_plant, read_plant
 
 CELLS = [
     *("one_robot", "one_robot_mc_late", "one_robot_mc_late_capacity", "two_robots_shared", "two_robots_separate"),
@@ -46,48 +18,6 @@ CELLS = [
 
 def plant_path(cell: str) -> Path:
     return catalogue_path(cell).with_name(f"{cell}.plant.yaml")
-
-
-def model(text: str = TEXT) -> PlantModel:
-    return parse_plant(text)
-
-
-class Bench:
-    """A plant with a clock; commands run to their end unless told otherwise."""
-
-    def __init__(self, *disturbances: Disturbance, workpieces: int = 2, text: str = TEXT, seed: int = 0) -> None:
-        self.plant = Plant(model(text), workpieces=workpieces, seed=seed, disturbances=disturbances)
-        self.now = 0.0
-        self.reports: list[PlantReport] = self.plant.advance(0.0)
-        self.tickets = 0
-
-    def give(self, machine: str, command: str, **parameters: str) -> list[PlantReport]:
-        self.tickets += 1
-        reports = self.plant.command(self.now, machine, command, parameters, self.tickets)
-        self.reports += reports
-        return reports
-
-    def wait(self, seconds: float) -> list[PlantReport]:
-        self.now += seconds
-        reports = self.plant.advance(self.now)
-        self.reports += reports
-        return reports
-
-    def do(self, machine: str, command: str, **parameters: str) -> list[PlantReport]:
-        return [*self.give(machine, command, **parameters), *self.wait(4.0)]
-
-    def fetch(self) -> None:
-        self.do("R", "MOVE", to="ENTRY")
-        self.do("R", "GRASP", at="ENTRY")
-
-    def load(self) -> None:
-        self.fetch()
-        self.do("R", "MOVE", to="TABLE")
-        self.do("R", "PUT", at="TABLE")
-
-    @property
-    def faults(self) -> list[str]:
-        return [f"{report.machine}: {report.message}" for report in self.reports if isinstance(report, PlantFault)]
 
 
 def test_workpiece_goes_through_and_is_delivered_once() -> None:
@@ -423,6 +353,12 @@ def test_machine_or_command_that_the_plant_lacks_is_said_at_the_table_to_add_it_
         assert words in problem.hint
 
 
+def test_hint_at_a_sensor_that_the_plant_lacks_names_all_that_one_can_see() -> None:
+    lacking = parse_plant(plant_path("one_robot").read_text("utf-8").replace("  mc.part_present:", "  mc.part:"))
+    hint = next(one.hint for one in misfits(lacking, catalogue_net("one_robot")) if "drives" in one.message)
+    assert all(f"`{kind}: " in hint for kind in ("occupied", "holding", "acknowledges", "passes", "fails"))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "line", "message"),
     [
@@ -465,6 +401,10 @@ def test_plant_file_that_contradicts_itself_is_refused_with_its_line(
         ("does: stop", "does: stop, may_fail: x", "F1008", "may_fail", "the keys here are does, takes_s, jitter_s"),
         ("{does: stop}", "\n      does: stop", "F1010", "STOP", "a mapping, lines of `name: value`"),
         ("plant: bench", "plant: bench\ncolour: red", "F1008", "colour", "unknown key 'colour'"),
+        ("{holding: R}", "{passes: table, likely: often}", "F1010", "often", "a number is expected"),
+        ("{holding: R}", "{passes: table, likely: 1.5}", "F1010", "1.5", "a number to 1 is expected"),
+        ("{holding: R}", "{passes: table, likely: -1}", "F1010", "-1", "a number from 0 is expected"),
+        ("{holding: R}", "{passes: table, likely: }", "F1010", "likely", "leave `likely` out"),
         ("firable_plant: 1", "firable_plant: 2", "F1011", "2", "write `firable_plant: 1`"),
     ],
 )

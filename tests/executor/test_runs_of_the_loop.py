@@ -8,9 +8,11 @@ loop would say nothing of the cell.
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from functools import cache
 
 import pytest
+from support import inspected_cell
 from support.together_cell import together
 
 from firable.decompose.splitting.cut import split
@@ -108,6 +110,24 @@ def test_a_run_of_the_executor_is_one_of_the_loop(cell: str, sending: Sending) -
     state, trace = trace_of(cell, 4 if sending is Sending.LATE else 8)
     assert state is (State.DEADLOCK if cell == "one_robot_mc_late" else State.DONE)
     assert follow(cell, trace, sending) > 10
+
+
+@pytest.mark.parametrize("sending", Sending)
+def test_a_run_in_which_workpieces_are_judged_is_one_of_the_loop(sending: Sending) -> None:
+    loop, ways = close(inspected_cell.net(), inspected_cell.plant(), sending=sending), set[str]()
+    for seed in range(3):
+        trace = inspected_cell.run(seed)
+        assert followed(loop, trace) > 30
+        ways |= {name for event in trace.events if isinstance(event, Fired) for name in event.transitions}
+        events = list(trace.events)
+        where = next(i for i, e in enumerate(events) if isinstance(e, SignalChanged) and e.signal.startswith("camera."))
+        shown = events[where]
+        assert isinstance(shown, SignalChanged)
+        other = {"camera.ok": "camera.nok", "camera.nok": "camera.ok"}[shown.signal]
+        both = SignalChanged(shown.at_seconds, other, value=True)
+        with pytest.raises(AssertionError, match=f"does not show {other} = 1"):
+            followed(loop, replace(trace, events=(*events[: where + 1], both, *events[where + 1 :])))
+    assert {"accept", "reject"} < ways
 
 
 def test_two_cells_in_a_line_carry_their_workpieces_through_as_the_loop_allows() -> None:

@@ -8,7 +8,8 @@ from copy import deepcopy
 from pathlib import Path
 
 import pytest
-from support.bench_cell import COMMANDS, bench, free_cell
+from support import inspected_cell
+from support.bench_cell import COMMANDS, JUDGED, bench, free_cell
 from support.examples import seeds
 
 from firable.executor.cell.plant import Plant, PlantFault, PlantReport
@@ -17,8 +18,8 @@ from firable.executor.cell.plant import _Finish as Finish
 from firable.nets.catalogue import catalogue_names, catalogue_net, catalogue_path, catalogue_plant
 from firable.nets.diagnostics import InputError
 from firable.nets.machines.closing import close
-from firable.nets.machines.laws import ACCIDENT, OVERRUN
-from firable.nets.machines.loop import ClosedLoop, Faults
+from firable.nets.machines.laws import ACCIDENT, OVERRUN, Laws
+from firable.nets.machines.loop import ClosedLoop, Faults, Sending
 from firable.nets.machines.moment import NOTHING, Case, each
 from firable.nets.machines.plant_file import PlantModel, parse_plant
 from firable.nets.net import Command, Controller, Net, Place, Signal, SignalKind, Transition
@@ -284,6 +285,69 @@ sensors:
 """
 
 
+# --- Workpieces that are judged
+
+
+def test_a_workpiece_is_found_good_or_not_some_time_after_it_has_come() -> None:
+    loop = close(inspected_cell.net(), inspected_cell.plant())
+    assert loop.shown["camera.ok"] == ("plant.table.passes", True)
+    assert loop.shown["camera.nok"] == ("plant.table.fails", True)
+    assert "plant.table.fails" in loop.net.transition("reject").permissive
+    good, bad = (loop.net.transition(f"table/judged/{found}") for found in ("passes", "fails"))
+    assert (good.outputs, bad.outputs) == (("plant.table.passes",), ("plant.table.fails",))
+    for one in (good, bad):
+        assert {"plant.table.empty", "plant.table.passes", "plant.table.fails"} < {*one.inhibitive, *one.outputs}
+    assert bad.description == "the workpiece on table is judged, and is not found good"
+    gone = [loop.net.transition(f"R/done/robot.take_bad{way}") for way in ("", "/table-passed", "/table-failed")]
+    assert ["plant.table.passes" in one.inputs for one in gone] == [False, True, False]
+    assert ["plant.table.fails" in one.inputs for one in gone] == [False, False, True]
+
+
+def test_whatever_a_workpiece_was_found_it_is_judged_no_more_when_it_was_machined() -> None:
+    net = close(free_cell(judged=True), bench(judged=JUDGED)).net
+    verdicts = {"plant.table.passes", "plant.table.fails"}
+    machined = [t for t in net.transitions if t.name.startswith("M/done/c.run")]
+    assert {frozenset({*t.inputs} & verdicts) for t in machined} == {
+        frozenset(),
+        frozenset({"plant.table.passes"}),
+        frozenset({"plant.table.fails"}),
+    }
+    assert all(verdicts <= {*t.inputs, *t.inhibitive} for t in machined)
+
+
+@pytest.mark.parametrize("faults", Faults)
+@pytest.mark.parametrize("sending", Sending)
+def test_one_judgement_stands_as_long_as_a_workpiece_lies_there_and_nothing_changes_it(
+    faults: Faults, sending: Sending
+) -> None:
+    loop = close(inspected_cell.net(), inspected_cell.plant(), faults, sending)
+    empty, passes, fails = (1 << loop.net.place_index[f"plant.table.{word}"] for word in ("empty", "passes", "fails"))
+    player, found, open_ = Player(loop.net), set[int](), [loop.net.initial_marking]
+    seen = set()
+    while open_:
+        marking = open_.pop()
+        assert [bool(marking & bit) for bit in (empty, passes, fails)].count(True) <= 1
+        for t in player.firable(marking):
+            after = player.fire(marking, [t])
+            was, now = marking & (empty | passes | fails), after & (empty | passes | fails)
+            seen.add((was, now))
+            if after not in found:
+                found.add(after)
+                open_.append(after)
+    assert {(was, now) for was, now in seen if was != now} == {
+        *((empty, 0), (0, passes), (0, fails), (passes, empty), (fails, empty))
+    }
+
+
+def test_a_judgement_never_makes_a_loop_restless() -> None:
+    loop = close(free_cell(judged=True), bench(judged=JUDGED))
+    verdicts = {f"plant.{station}.{word}" for station in ("entry", "table", "exit") for word in ("passes", "fails")}
+    for t in loop.net.transitions:
+        if {*t.inputs, *t.outputs} <= verdicts and (t.inputs or t.outputs):
+            assert "/judged/" in t.name
+            assert not t.inputs, "it happens once for a workpiece that lies there"
+
+
 # --- The laws are those of the simulated cell
 
 
@@ -294,6 +358,13 @@ class AlwaysInTime(random.Random):
         return 0.0
 
 
+class Told(Plant):
+    """A plant whose cameras find workpieces what they are told to, and when."""
+
+    def _find(self, station: str) -> None:
+        """Nothing yet."""
+
+
 class Twin:
     """A loop and a simulated plant that are led through the same events."""
 
@@ -301,8 +372,9 @@ class Twin:
         self.net, self.loop = net, close(net, model)
         self.player, self.marking = Player(self.loop.net), self.loop.net.initial_marking
         self.own = {variant: name for name, some in self.loop.variants.items() for variant in some}
-        self.plant = Plant(model, workpieces=10_000)
+        self.plant = Told(model, workpieces=10_000)
         self.plant.random = AlwaysInTime()
+        self.judged = sorted(Laws(model, net).judged)
 
     def holds(self, place: str) -> bool:
         return bool(self.marking >> self.loop.net.place_index[place] & 1)
@@ -336,6 +408,9 @@ class Twin:
             return []
         if what == "leaves":
             return self.plant._lawful("", self.departing())
+        if of.startswith("judged/"):
+            self.plant.found_good[what] = of == "judged/passes"
+            return []
         if of.partition("/")[0] in {"shown", "told", "clears", "drops", "returns"}:
             return []
         machine = self.plant.machines[what]
@@ -379,15 +454,24 @@ class Twin:
                 assert fact not in self.loop.net.place_index or not self.holds(fact) or place.name == broken_off
             if machine.position is not None:
                 assert self.holds(f"plant.{name}.hand_at.{machine.position}")
+        for station in self.judged:
+            found = self.plant.found_good.get(station)
+            shown = {good: self.holds(f"plant.{station}.{word}") for good, word in ((True, "passes"), (False, "fails"))}
+            assert shown == {True: found is True, False: found is False}
+        for name, sensor in self.plant.model.sensors.items():
+            shows, means = self.loop.shown[name]
+            is_exact = shows != name and not (sensor.may_flicker or sensor.may_linger)
+            assert not is_exact or (self.holds(shows) == means) == self.plant._sees(name, sensor)
         for station in ("table",):
             assert self.holds(f"plant.{station}.clamped") == (station in self.plant.clamped)
 
 
 @pytest.mark.seeds
 @pytest.mark.parametrize("seed", seeds(20))
-def test_the_loop_and_the_simulated_cell_obey_the_same_laws(seed: int) -> None:
+@pytest.mark.parametrize("judged", ["", JUDGED], ids=["", "judged"])
+def test_the_loop_and_the_simulated_cell_obey_the_same_laws(seed: int, judged: str) -> None:
     draw = random.Random(seed)
-    twin = Twin(free_cell(), bench())
+    twin = Twin(free_cell(judged=bool(judged)), bench(judged=judged))
     for _ in range(60):
         choices = twin.player.firable(twin.marking)
         # Accidents end a walk, so they are left for the end, where one is seen to happen in both.
@@ -406,8 +490,9 @@ def test_the_loop_and_the_simulated_cell_obey_the_same_laws(seed: int) -> None:
 def test_a_variant_is_firable_iff_its_transition_is_and_its_gates_are_open(seed: int) -> None:
     draw = random.Random(seed)
     chosen = tuple(draw.sample(list(COMMANDS), 6))
-    net = free_cell(chosen)
-    loop = close(net, bench(draw.choice(["", ", may_flicker: true", ", may_linger: true"])))
+    judged = draw.choice(["", JUDGED])
+    net = free_cell(chosen, judged=bool(judged))
+    loop = close(net, bench(draw.choice(["", ", may_flicker: true", ", may_linger: true"]), judged))
     player, open_player = Player(loop.net), Player(net)
     marking, mask = loop.net.initial_marking, (1 << len(net.places)) - 1
 

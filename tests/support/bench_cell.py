@@ -62,15 +62,33 @@ COMPLETIONS = {
     "halt": "c.at_rest",
 }
 """Which commands are waited for: one by its sensor, one with two places, three by acknowledgement alone."""
+CAMERAS = {
+    "door": (ExternalGate("c.ok"),),
+    "to_home": (ExternalGate("c.nok"), ExternalGate("c.fresh")),
+    "to_exit": (ExternalGate("c.worse", wanted=False), ExternalGate("c.ok", wanted=False)),
+}
+"""What a camera must show before the end of a command counts."""
 
 
-def bench(extra: str = "") -> PlantModel:
-    """The plant, with something added to its first sensor."""
-    return parse_plant(PLANT.replace("{occupied: entry}", f"{{occupied: entry{extra}}}"))
+JUDGED = """\
+  c.fresh: {passes: entry}
+  c.ok:    {passes: table, likely: 0.5}
+  c.nok:   {fails: table}
+  c.worse: {fails: exit}
+"""
+"""Cameras at every station: where workpieces come, where they are machined, where they go."""
 
 
-def free_cell(chosen: tuple[str, ...] = tuple(COMMANDS)) -> Net:
-    """A net with a place to rest and a place to command for each chosen command, each independent of the others."""
+def bench(extra: str = "", judged: str = "") -> PlantModel:
+    """The plant, with something added to its first sensor, and more sensors."""
+    return parse_plant(PLANT.replace("{occupied: entry}", f"{{occupied: entry{extra}}}") + judged)
+
+
+def free_cell(chosen: tuple[str, ...] = tuple(COMMANDS), *, judged: bool = False) -> Net:
+    """A net with a place to rest and a place to command for each chosen command, each independent of the others.
+
+    Where workpieces are judged, some of these wait for a camera to show that, or that it does not.
+    """
     places, transitions = [], []
     for name in chosen:
         completion = COMPLETIONS.get(name)
@@ -78,7 +96,8 @@ def free_cell(chosen: tuple[str, ...] = tuple(COMMANDS)) -> Net:
             Place(f"c.rest_{name}", "c", marked=True),
             Place(f"c.{name}", "c", command=Command(*COMMANDS[name]), completion=completion),
         ]
-        gates = (ExternalGate(completion),) if completion else ()
+        waits = (ExternalGate(completion),) if completion else ()
+        gates = (*waits, *(CAMERAS.get(name, ()) if judged else ()))
         entry = (ExternalGate("c.entry", wanted=name != "belt_out"),) if name in {"belt", "belt_out"} else ()
         transitions += [
             Transition(f"send_{name}", (f"c.rest_{name}",), (f"c.{name}",), external=entry),
@@ -86,6 +105,7 @@ def free_cell(chosen: tuple[str, ...] = tuple(COMMANDS)) -> Net:
         ]
     completions = dict.fromkeys(COMPLETIONS[name] for name in chosen if name in COMPLETIONS)
     signals = [Signal("c.entry", "c"), *(Signal(name, "c", SignalKind.COMPLETION) for name in completions)]
+    signals += [Signal(name, "c") for name in ("c.fresh", "c.ok", "c.nok", "c.worse") if judged]
     if "c.hand" not in completions:
         signals.append(Signal("c.hand", "c"))
     return Net("bench", tuple(places), tuple(transitions), tuple(signals), (Controller("c"),))
