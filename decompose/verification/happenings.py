@@ -372,19 +372,20 @@ class Plant(Things):
 
     def sensors_see(self, effect: Changes, state: State) -> Iterator[Changes]:
         """What sensors that are not exact show where a workpiece comes or goes; nothing where that cannot be."""
-        changes: Changes = {}
+        ways: list[Changes] = [{}]
         for name, sensor in self.model.sensors.items():
             thing, bit = target_of(sensor), f"bit {name}"
             if bit not in self.things or thing not in effect or (effect[thing] is None) == (state[thing] is None):
                 continue
             came = effect[thing] is not None
-            if not came and sensor.may_linger:
-                continue  # it clears some time later
-            if bool(state[bit]) != came:
-                changes[bit] = came
+            if not came and sensor.may_linger:  # it clears some time later; of a completion also before that is formed
+                if name in self.sensed and state[bit]:
+                    ways += [{**way, bit: False} for way in ways]
+            elif bool(state[bit]) != came:
+                ways = [{**way, bit: came} for way in ways]
             elif not (sensor.may_linger if came else sensor.may_flicker):
                 return
-        yield changes
+        yield from ways
 
     def comes_to_be_shown(self, name: str, state: State) -> Iterator[Changes]:
         """The sensor of a completion that is acknowledged shows it."""
@@ -398,12 +399,13 @@ class Plant(Things):
             yield from ({entry: "raw", **seen} for seen in self.sensors_see({entry: "raw"}, state))
 
     def leaves(self, state: State) -> Iterator[Changes]:
-        """A finished workpiece is taken away from the last station; an unfinished one is an accident."""
+        """A finished workpiece is taken away from the last station; an unfinished one is an accident, unless workpieces
+        come there, too: it waits to be machined."""
         last = f"has {self.model.departures.station}"
         if state[last] == self.kinds[-1]:
             gone = self.unjudged({last: None})
             yield from ({**gone, **seen} for seen in self.sensors_see(gone, state))
-        elif state[last] is not None:
+        elif state[last] is not None and self.model.arrivals.station != self.model.departures.station:
             yield {ACCIDENT: True}
 
     def wavers(self, name: str, way: str, state: State) -> Iterator[Changes]:

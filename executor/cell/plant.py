@@ -92,7 +92,9 @@ class _Arrival:
 
 @dataclass(frozen=True, slots=True)
 class _Departure:
-    """The workpiece at the end is taken away."""
+    """A workpiece at the end is taken away, if it is still there."""
+
+    id: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,6 +163,8 @@ class Plant:
         self.stations: dict[str, Workpiece | None] = dict.fromkeys(model.stations)
         self.clamped: set[str] = set()
         judging = [sensor for sensor in model.sensors.values() if sensor.judges is not None]
+        actions = (action for machine in model.machines.values() for action in machine.commands.values())
+        self.machines_workpieces = any(isinstance(action, Process) for action in actions)
         self.likely = {str(one.judges): GOOD for one in judging}
         """How likely a workpiece is to be found good, at each station where that is judged."""
         self.likely |= {str(one.judges): one.good for one in judging if one.good is not None}
@@ -257,8 +261,8 @@ class Plant:
             case _Arrival():
                 self.arrival_due = True
                 self._arrive()
-            case _Departure():
-                self._depart()
+            case _Departure(id_):
+                self._depart(id_)
             case _Finish(machine, busy):
                 now = self.machines[machine]
                 if now.busy is busy:
@@ -284,19 +288,17 @@ class Plant:
             if self.to_come:
                 self._in(arrivals.every_s, arrivals.jitter_s, _Arrival())
 
-    def _depart(self) -> None:
+    def _depart(self, id_: int) -> None:
         station = self.model.departures.station
         workpiece = self.stations[station]
-        if workpiece is None:
+        if workpiece is None or workpiece.id != id_:
             return
         self._gone(station)
+        if station == self.model.arrivals.station:
+            self._arrive()
         self._wake()
         self.delivered.append(workpiece)
-        if not workpiece.processed and any(
-            isinstance(action, Process)
-            for machine in self.model.machines.values()
-            for action in machine.commands.values()
-        ):
+        if not workpiece.processed and self.machines_workpieces:
             raise _FaultError(f"workpiece {workpiece.id} leaves the cell without having been machined")
 
     def _begin(self, name: str, busy: _Busy) -> Iterator[PlantReport]:
@@ -390,8 +392,11 @@ class Plant:
                 self._lying(station, f"{name} clamps on {station}")
                 self.clamped.add(station)
             case Process(station=station):
-                self._lying(station, f"{name} machines on {station}").processed += 1
+                workpiece = self._lying(station, f"{name} machines on {station}")
+                workpiece.processed += 1
                 self._judge(station)
+                if station == self.model.arrivals.station:
+                    self._finished(station, workpiece)
             case Release(station=station):
                 self.clamped.discard(station)
         if (drops := self.disturbances.drops(name, busy.command, machine.times[busy.command])) is not None:
@@ -427,6 +432,13 @@ class Plant:
     def _lies(self, station: str, workpiece: Workpiece) -> None:
         self.stations[station] = workpiece
         self._judge(station)
+        self._finished(station, workpiece)
+
+    def _finished(self, station: str, workpiece: Workpiece) -> None:
+        """Have a workpiece taken away at its end; where workpieces arrive there, too, not before it was machined."""
+        is_end = station == self.model.departures.station
+        if is_end and (workpiece.processed or station != self.model.arrivals.station or not self.machines_workpieces):
+            self._in(self.model.departures.after_s, 0.0, _Departure(workpiece.id))
 
     def _gone(self, station: str) -> None:
         self.stations[station] = None
@@ -469,8 +481,6 @@ class Plant:
             raise _FaultError(f"{name} pushes workpiece {workpiece.id} onto {station}, where workpiece {there.id} lies")
         machine.holding = None
         self._lies(station, workpiece)
-        if station == self.model.departures.station:
-            self._in(self.model.departures.after_s, 0.0, _Departure())
 
     def _keys(self, machine: str) -> Iterator[tuple[str, Sensor]]:
         """The keys that acknowledge a fault of a machine."""

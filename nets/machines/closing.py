@@ -455,6 +455,8 @@ class _Closing:
                 moments = each(moments, [at_once, *([stays] if sensor.may_linger else [])])
             elif not sensor.may_linger:
                 moments = each(moments, [at_once, *([stays] if sensor.may_flicker else [])])
+            elif name in self.acknowledged:  # it may linger, and need not: the completion is formed from what it shows
+                moments = each(moments, [Case(), replace(at_once, tag=f"{name}-clears")])
         return moments
 
 

@@ -200,7 +200,9 @@ class Laws:
                 yield Case((*free, (self._hand(place), True), (self.empty(name), False)), taken)
             case Carry(source=source):
                 yield from (Case(free, taken).with_(moved) for moved in self._moved(source, name))
-                yield Case((*free, (self.empty(name), False)), taken, "goes-on", f"{name} still has its workpiece")
+                yield Case(
+                    (*free, (self.empty(name), False)), taken, f"{name}-goes-on", f"{name} still has its workpiece"
+                )
             case Process(station=station):
                 yield Case((*free, (self.clamped(station), True), (self.has(station, _RAW), True)), taken)
             case _:
@@ -388,9 +390,12 @@ class Laws:
         yield from map(gone.with_, self._judged_no_more(station))
 
     def departs_raw(self) -> Iterator[Case]:
-        """The accident that a workpiece leaves which no machine has machined, where one should have."""
-        if len(self.kinds) > 1:
-            station = self.model.departures.station
+        """The accident that a workpiece leaves which no machine has machined, where one should have.
+
+        One that has only come where others are taken away waits there to be machined.
+        """
+        station = self.model.departures.station
+        if len(self.kinds) > 1 and station != self.model.arrivals.station:
             words = "a workpiece leaves the cell without having been machined"
             yield self._accident(((self.has(station, _RAW), True),), "raw", words)
 

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from support import inspected_cell
 from support.bench_cell import JUDGED, bench, free_cell
-from support.together_cell import belts, together
+from support.together_cell import BELT_PLANT, belts, together
 
 from firable.decompose.verification import same_loop
 from firable.decompose.verification.happenings import Plant
@@ -514,7 +514,10 @@ def test_a_place_of_the_net_may_bear_any_name_that_the_plant_does_not() -> None:
 @pytest.mark.parametrize("sending", Sending)
 @pytest.mark.parametrize("extra", ["", ", may_flicker: true", ", may_linger: true"])
 def test_signals_that_change_together_are_read_twice_too(extra: str, sending: Sending, faults: Faults) -> None:
-    for net, model in (together(), belts(extra)):
+    both = BELT_PLANT.replace("arrivals:   {station: entry", "arrivals:   {station: table")
+    sensed = BELT_PLANT.replace("{occupied: table}", "{occupied: table, may_linger: true}\n  belt.there: {holding: B")
+    assert BELT_PLANT not in {both, sensed}
+    for net, model in (together(), belts(extra), belts(extra, both), belts(extra, f"{sensed[:-1]}{extra}}}\n")):
         plant = Plant(net, model, sending, faults)
         assert set(plant.late) == {name for name in plant.truths if f"{name}/told" in plant.happenings}
         assert {"robot.holds", "belt.on_it"} & {*plant.late}

@@ -6,7 +6,7 @@ import pytest
 from support.plant_bench import TEXT, Bench
 
 from firable.executor.cell.disturbances import Drops, NeverCompletes, StuckSensor
-from firable.executor.cell.plant import CommandDone, SensorChanged
+from firable.executor.cell.plant import CommandDone, SensorChanged, Workpiece
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.diagnostics import InputError
 from firable.nets.machines.plant_file import misfits, parse_plant, read_plant
@@ -278,6 +278,39 @@ def test_workpiece_that_leaves_unmachined_is_a_fault() -> None:
     bench.do("R", "MOVE", to="EXIT")
     bench.do("R", "PUT", at="EXIT")
     assert bench.faults == [": workpiece 1 leaves the cell without having been machined"]
+
+
+LOADED_BY_HAND = TEXT.replace("station: entry, every", "station: table, every").replace(
+    "station: exit,", "station: table,"
+)
+
+
+def test_workpiece_is_taken_away_where_it_has_come_once_it_was_machined_there() -> None:
+    bench = Bench(text=LOADED_BY_HAND)
+    bench.wait(20)
+    assert bench.plant.delivered == [], "it waits to be machined"
+    bench.do("M", "CLAMP")
+    bench.do("M", "RUN")
+    bench.do("M", "UNCLAMP")
+    assert [workpiece.id for workpiece in bench.plant.delivered] == [1]
+    assert bench.plant.stations["table"] == Workpiece(2)
+    assert bench.faults == []
+    without = "".join(line for line in LOADED_BY_HAND.splitlines(keepends=True) if "does: process" not in line)
+    bench = Bench(text=without)
+    bench.wait(20)
+    assert [workpiece.id for workpiece in bench.plant.delivered] == [1, 2]
+
+
+def test_workpiece_that_has_been_grasped_meanwhile_is_not_taken_away_nor_is_another() -> None:
+    bench = Bench(text=LOADED_BY_HAND.replace("after_s: 1", "after_s: 12"))
+    for command in ("CLAMP", "RUN", "UNCLAMP"):
+        bench.do("M", command)
+    bench.do("R", "MOVE", to="TABLE")
+    bench.give("R", "GRASP", at="TABLE")
+    bench.wait(9)
+    assert bench.plant.delivered == []
+    assert bench.plant.stations["table"] == Workpiece(2)
+    assert bench.faults == []
 
 
 def test_disturbed_command_is_taken_and_never_done() -> None:

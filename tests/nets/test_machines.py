@@ -8,10 +8,11 @@ from copy import deepcopy
 from pathlib import Path
 
 import pytest
-from support import inspected_cell
+from support import inspected_cell, together_cell
 from support.bench_cell import COMMANDS, JUDGED, bench, free_cell
 from support.examples import seeds
 
+from firable.analysis.loop.verdicts import check_loop
 from firable.executor.cell.plant import Plant, PlantFault, PlantReport
 from firable.executor.cell.plant import _Busy as Busy
 from firable.executor.cell.plant import _Finish as Finish
@@ -25,6 +26,7 @@ from firable.nets.machines.plant_file import PlantModel, parse_plant
 from firable.nets.net import Command, Controller, Net, Place, Signal, SignalKind, Transition
 from firable.nets.printing import format_net
 from firable.nets.text import parse_net
+from firable.nets.verdict import Status
 from firable.semantics.player import Player
 
 CELLS = [name for name in catalogue_names() if catalogue_path(name).with_name(f"{name}.plant.yaml").exists()]
@@ -137,6 +139,53 @@ def test_a_sensor_that_may_linger_clears_after_the_workpiece_has_gone() -> None:
     assert "c.entry/clears" in names
     assert "c.entry/drops" not in names
     assert "arrives/entry/c.entry-on" in names
+
+
+LINGERING = """\
+firable: 1
+cell: lingering
+controllers:
+  robot:
+    start: free
+    inputs: entry
+    places:
+      free:
+      grasp: {send: {machine: R, command: GRASP, at: ENTRY}, until: grasped}
+      move:  {send: {machine: R, command: MOVE, to: EXIT}, until: there}
+      put:   {send: {machine: R, command: PUT, at: EXIT}, until: holds}
+      back:  {send: {machine: R, command: MOVE, to: ENTRY}, until: there}
+transitions:
+  come: {from: robot.free, to: robot.grasp, if: robot.entry}
+  t1:   {from: robot.grasp, to: robot.move}
+  t2:   {from: robot.move, to: robot.put}
+  t3:   {from: robot.put, to: robot.back}
+  t4:   {from: robot.back, to: robot.free}
+"""
+
+
+@pytest.mark.parametrize("extra", ["", ", may_linger: true"])
+def test_a_sensor_that_may_linger_need_not_where_a_completion_waits_for_it(extra: str) -> None:
+    """That the hand holds something ends no laying down: not even where the sensor may take its time to see that."""
+    model = parse_plant(together_cell.PLANT.replace("robot.holds: {holding: R}", f"robot.holds: {{holding: R{extra}}}"))
+    report = check_loop(parse_net(LINGERING), model)
+    assert report.verdict("loop.deadlock-free").status is Status.VIOLATED
+
+
+def test_two_belts_that_start_in_one_firing_are_told_apart() -> None:
+    """Each may still have its workpiece, or take one."""
+    places = (
+        Place("c.rest", "c", marked=True),
+        Place("c.one", "c", command=Command("A", "RUN")),
+        Place("c.two", "c", command=Command("B", "RUN")),
+    )
+    net = Net("belts", places, (Transition("both", ("c.rest",), ("c.one", "c.two")),), (), (Controller("c"),))
+    belts = "".join(
+        f"  {name}: {{commands: {{RUN: {{does: carry, from: {source}, to: {target}, takes_s: 1}}}}}}\n"
+        for name, source, target in (("A", "s", "t"), ("B", "t", "u"))
+    )
+    plant = "firable_plant: 1\nplant: belts\nstations: [s, t, u]\narrivals: {station: s, every_s: 1}\n"
+    loop = close(net, parse_plant(f"{plant}departures: {{station: u}}\nmachines:\n{belts}sensors: {{}}\n"))
+    assert {"both", "both/A-goes-on", "both/B-goes-on", "both/A-goes-on/B-goes-on"} <= {*loop.variants["both"]}
 
 
 def test_only_what_may_fail_fails_and_only_what_is_repairable_is_repaired() -> None:
@@ -419,7 +468,9 @@ class Twin:
         return self.plant._lawful(what, self.plant._happen(Finish(what, busy)))
 
     def departing(self) -> Iterator[PlantReport]:
-        self.plant._depart()
+        leaving = self.plant.stations[self.plant.model.departures.station]
+        assert leaving is not None
+        self.plant._depart(leaving.id)
         yield from ()
 
     def compare(self) -> None:

@@ -102,6 +102,6 @@ def together(first: str = "entry") -> tuple[Net, PlantModel]:
     return parse_net(NET), parse_plant("\n".join((*text, *sensors, "")))
 
 
-def belts(extra: str = "") -> tuple[Net, PlantModel]:
+def belts(extra: str = "", plant: str = BELT_PLANT) -> tuple[Net, PlantModel]:
     """A cell whose sensors change with a command that is sent, too; something is added to the one at the entry."""
-    return parse_net(BELT_NET), parse_plant(BELT_PLANT.replace("{occupied: entry}", f"{{occupied: entry{extra}}}"))
+    return parse_net(BELT_NET), parse_plant(plant.replace("{occupied: entry}", f"{{occupied: entry{extra}}}"))
