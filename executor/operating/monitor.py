@@ -9,7 +9,8 @@ states as there are sets of markings, of which a run meets few.
 
 *Seen* are the firings, the commands sent and the signals taken; *hidden* is what machines, workpieces and sensors do by
 themselves (`watched_loop.py`). A signal is taken later than it changed: on the way lie a driver, a link, a promise that
-latches it. So what a signal is and what was taken of it may differ for `latency_seconds`, and no longer.
+latches it. So what a signal is and what was taken of it may differ for `latency_seconds`, and no longer; so long it
+may also have changed back by the time it is taken.
 
 *Absence* is seen too, because a plant file has times: a command is done at the latest after its time and its jitter, or
 when the station that it waits for has become free, and seen to be after the latency. A marking of the belief in which
@@ -108,6 +109,8 @@ class Monitor:
         self.freed_seconds = dict.fromkeys(self.signals, _NEVER)
         """When a promise on each signal was last seen."""
         self.taken = [bool(self.loop.initial & bit) == means for bit, means in self.loop.shown]
+        self.taken_seconds: dict[str, float] = {}
+        """When each signal was taken last."""
         self.demanded_in: dict[tuple[Marking, tuple[bool, ...]], _Demanded] = {}
         self.sent_seconds: dict[str, float] = {}
         self.marking = net.initial_marking
@@ -163,9 +166,19 @@ class Monitor:
             return None
         bit, means = self.loop.shown[s]
         believed = self._closed(self.belief, at_seconds)
-        explained = {m: since for m, since in believed.items() if (bool(m & bit) == means) == value}
+        explained = {
+            m: since
+            for m, since in believed.items()
+            if (bool(m & bit) == means) == value or self._has_been(since[s], name, at_seconds)
+        }
+        self.taken_seconds[name] = at_seconds
         message = f"'{name}' became {int(value)}, and nothing that the machines can have done explains it"
         return self._believe(explained, at_seconds, name, message, self._waiting_for(name))
+
+    def _has_been(self, changed_seconds: float, name: str, at_seconds: float) -> bool:
+        """Whether a signal that has changed again may be taken only now: since it was taken last, and not long ago."""
+        is_new = changed_seconds > self.taken_seconds.get(name, _NEVER)
+        return is_new and at_seconds <= self._excused(changed_seconds, name) + self.latency_seconds
 
     def passed(self, at_seconds: float) -> Divergence | None:
         """Time has passed, and nothing was seen: what has become too late is left, one deadline after the other."""

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from support import inspected_cell
+from support import inspected_cell, together_cell
 from support.bench_cell import JUDGED, bench, free_cell
 from support.watched_runs import CELLS, run_of, slower
 
@@ -155,6 +155,32 @@ def test_either_judgement_is_explained_and_one_that_changes_while_the_workpiece_
         found = monitor.signal(shows.at_seconds + 0.1, other, value=True)
         assert found is not None
         assert found.subject == other, "both at once"
+
+
+@pytest.mark.parametrize(("late_seconds", "explained"), [(0.0, True), (0.4, True), (0.6, False)])
+def test_a_signal_that_has_changed_again_may_be_taken_late_and_once(late_seconds: float, explained: bool) -> None:
+    """One controller knows that the workpiece was laid down when another is told that the hand held it."""
+    fast = together_cell.PLANT.replace("takes_s: 0.5, when_full: wait", "takes_s: 0.1")
+    fast = fast.replace("takes_s: 1,", "takes_s: 0.1,")
+    monitor = Monitor(parse_net(together_cell.NET), parse_plant(fast))
+    monitor.signal(0.0, "robot.entry", value=True)
+    laid = 0.8
+    for at, fired, sent, completion in (
+        (0.0, "come", "robot.grasp", "robot.grasped"),
+        (0.6, "t1", "robot.to_exit", "robot.there"),
+        (0.7, "t2", "robot.put", "robot.placed"),
+    ):
+        assert monitor.fired(at, fired) is None
+        assert monitor.sent(at, sent) is None
+        assert monitor.signal({"come": 0.5, "t1": 0.7, "t2": laid}[fired], completion, value=True) is None
+    found = monitor.signal(laid + late_seconds, "robot.holds", value=True)
+    assert (found is None) == explained
+    assert found is None or found.subject == "robot.holds"
+    if explained:
+        assert monitor.signal(laid + late_seconds, "robot.holds", value=False) is None
+        again = monitor.signal(laid + late_seconds, "robot.holds", value=True)
+        assert again is not None
+        assert again.subject == "robot.holds"
 
 
 @pytest.mark.parametrize(("after_seconds", "patience"), [(0.0, 0.9), (3.0, 3.9)])
