@@ -34,18 +34,18 @@ from firable.nets.diagnostics import Diagnostic, Subject
 from firable.nets.net import ExternalGate, Net, Place, SignalKind, Transition
 
 MILLISECONDS_MAX: Final = 24 * 60 * 60 * 1000
-TIME_PATTERN: Final = r"^(0|[1-9][0-9]{0,8})(\.[0-9]{1,3})? ?(ms|s|min)$"
+TIME_PATTERN: Final = r"^(0|[1-9][0-9]{0,8})(\.[0-9]{1,3})? ?(ms|s|min|h)$"
 """A time in a net file: a number, and its unit."""
 
 _TIME: Final = re.compile(TIME_PATTERN)
-_UNITS_MS: Final = {"min": 60_000, "s": 1_000, "ms": 1}  # the largest first
+_UNITS_MS: Final = {"h": 3_600_000, "min": 60_000, "s": 1_000, "ms": 1}  # the largest first
 
 
 def parse_time(text: str) -> int | None:
     """The milliseconds that a time of a net file says; None for what is no time limit, or no whole number of them.
 
-    >>> [parse_time(text) for text in ("5s", "1.5 s", "2min", "5", "0.5ms", "0s")]
-    [5000, 1500, 120000, None, None, None]
+    >>> [parse_time(text) for text in ("5s", "1.5 s", "2min", "8h", "5", "0.5ms", "0s")]
+    [5000, 1500, 120000, 28800000, None, None, None]
     """
     found = _TIME.fullmatch(text)
     if found is None:
@@ -133,7 +133,7 @@ def no_time(place: str, text: str) -> Diagnostic:
     return Diagnostic(
         "F2029",
         f"'{text}' is no time limit for '{place}'",
-        f"write a number with ms, s or min, from 1ms to {format_time(MILLISECONDS_MAX)}, such as `within: 5s`",
+        f"write a number with ms, s, min or h, from 1ms to {format_time(MILLISECONDS_MAX)}, such as `within: 5s`",
         ("places", place, "within", "time"),
     )
 

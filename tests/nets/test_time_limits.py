@@ -90,7 +90,7 @@ def test_a_fault_place_that_nobody_declared_is_not_printed() -> None:
 @pytest.mark.parametrize(
     ("within", "found"),
     [
-        *((text, [("F2029", text)]) for text in ("5", "0s", "-5s", "5h", "1e3s", "0.5ms", "1441min", "s", "05s")),
+        *((text, [("F2029", text)]) for text in ("5", "0s", "-5s", "5d", "1e3s", "0.5ms", "1441min", "s", "05s")),
         ("{time: 5 minutes}", [("F2029", "5 minutes")]),
         ("{time: 5s, to: stukc}", [("F2002", "stukc"), ("F2002", "robot.go_fault")]),
         ("{time: 5s, to: go}", [("F2009", "go"), ("F2002", "robot.go_fault")]),
@@ -146,7 +146,8 @@ def test_half_a_time_limit_in_json_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "milliseconds"), [("1ms", 1), ("1440min", MILLISECONDS_MAX), ("0.001s", 1), ("90 s", 90_000)]
+    ("text", "milliseconds"),
+    [("1ms", 1), ("1440min", MILLISECONDS_MAX), ("0.001s", 1), ("90 s", 90_000), ("8h", 28_800_000)],
 )
 def test_a_time_is_read_as_milliseconds(text: str, milliseconds: int) -> None:
     assert parse_time(text) == milliseconds
