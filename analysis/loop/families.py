@@ -11,7 +11,7 @@ moves any more, neither cell nor machines.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
@@ -26,6 +26,7 @@ from firable.nets.machines.loop import ClosedLoop
 from firable.nets.net import Net, Property, PropertyKind, TemporalProperty
 from firable.nets.temporal import Fires, TemporalOr
 from firable.nets.verdict import Status, Verdict, Weight, Witness
+from firable.semantics.player import Player
 
 if TYPE_CHECKING:
     from firable.analysis.evidence.document import Document
@@ -181,9 +182,24 @@ def _joined(loop: ClosedLoop, family: Family, found: Mapping[str, Verdict]) -> V
 def _note(loop: ClosedLoop, family: Family, about: str, witness: Witness) -> str:
     """What has happened where a violation ends, in the words of the cell."""
     last = witness.firings[-1][0] if witness.firings else ""
-    if last in loop.accidents:
-        return loop.accidents[last]
-    return ": ".join(filter(None, (family.note.format(about), waiting(loop, witness.marking))))
+    ends = loop.accidents.get(last) or ": ".join(
+        filter(None, (family.note.format(about), waiting(loop, witness.marking)))
+    )
+    return "; ".join(filter(None, (ends, *between(loop, witness))))
+
+
+def between(loop: ClosedLoop, witness: Witness) -> Iterator[str]:
+    """What fires in a run of the loop between two signals of one instant, each as a sentence."""
+    player, marking = Player(loop.net), loop.net.initial_marking
+    own = {variant: name for name, variants in loop.variants.items() for variant in variants}
+    bits = {signal: 1 << loop.net.place_index[place] for signal, place in loop.news.items()}
+    found = dict[str, None]()
+    for fired in witness.firings if bits else ():
+        untold = listed([signal for signal, bit in bits.items() if marking & bit])
+        early = (own[name] for name in fired if name in own and untold)
+        found |= dict.fromkeys(f"{name} fires before a controller is told of {untold}" for name in early)
+        marking = player.fire(marking, [loop.net.transition_index[name] for name in fired])
+    yield from found
 
 
 def waiting(loop: ClosedLoop, marking: Sequence[str]) -> str:

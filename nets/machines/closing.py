@@ -188,6 +188,7 @@ class _Closing:
             MappingProxyType(self.failed),
             MappingProxyType(self.acknowledged),
             MappingProxyType(self.unsent),
+            MappingProxyType(self.telling.news),
         )
 
     def places(self) -> Iterator[Place]:

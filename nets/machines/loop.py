@@ -41,7 +41,8 @@ class ClosedLoop:
     those that more than a fault transition reads); `at` for
     each place with a command the place that says that the machine is at it; `failed` the place of each machine that
     can fail; `acknowledged`, for a completion that waits for its sensor, the place that says so; `unsent`, where
-    commands are sent late, the place that says that the command of a place is still to be sent.
+    commands are sent late, the place that says that the command of a place is still to be sent; `news`, for a signal of
+    which a controller may be told late, the place that says that it has changed since.
     """
 
     cell: Net
@@ -53,6 +54,7 @@ class ClosedLoop:
     failed: Mapping[str, str]
     acknowledged: Mapping[str, str]
     unsent: Mapping[str, str]
+    news: Mapping[str, str]
 
     def of_the_cell(self, firings: Iterable[Iterable[str]]) -> tuple[tuple[str, ...], ...]:
         """A firing sequence of the loop as one of the cell: the names of its transitions, without the machines."""

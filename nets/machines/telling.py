@@ -111,6 +111,11 @@ class Telling:
         read = (signal.name for signal in self.laws.net.signals if signal.name in sensors)
         return {name: sensors[name].passes is not None for name in read if sensors[name].judges == station}
 
+    @property
+    def news(self) -> dict[str, str]:
+        """For each signal that may be told late the place that says that there is news of it."""
+        return {signal: _news(signal) for signal in self.late}
+
     # --- Its places and firings
 
     def shown(self, signal: str) -> Literal:
@@ -120,7 +125,7 @@ class Telling:
     @property
     def all_told(self) -> Case:
         """No controller is still to be told anything."""
-        return Case(tuple((_news(signal), False) for signal in self.late))
+        return Case(tuple((news, False) for news in self.news.values()))
 
     def places(self) -> Iterator[Place]:
         """What controllers were told of signals that are told late, and of which there is news."""

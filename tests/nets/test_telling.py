@@ -29,6 +29,7 @@ def test_a_cell_that_fires_between_two_signals_of_one_instant_is_found(monkeypat
     assert verdict.status is Status.VIOLATED
     assert verdict.witness is not None
     assert verdict.witness.firings == (("arrives/entry",), ("come",), ("R/done/robot.grasp",), ("lost",))
+    assert "lost fires before a controller is told of robot.holds, robot.grasped" in verdict.witness.note
     assert report.verdict("loop.deadlock-free").status is Status.VIOLATED
     monkeypatch.setattr(Telling, "told_late", lambda *_: frozenset())
     at_once = check_loop(*together())
