@@ -22,7 +22,7 @@ place waits until then.
     S/drops, S/returns, S/clears     a sensor that is not exact
     S/pressed, S/released            a key
     S/over             a time limit that somebody reads
-    S/told             a controller is told of a signal that has changed together with another one
+    S/told             a controller is told of a signal that has changed some moment before
 
 Rejected: an explored comparison with the simulated cell, which is exact about times and cannot say that nothing is
 left out.
@@ -127,7 +127,7 @@ class Plant(Things):
                 yield from self.told_at_once(changes, state)
 
     def told_at_once(self, changes: Changes, state: State) -> Iterator[Changes]:
-        """Of what changes with another signal a controller may be told later; it clears completions by itself."""
+        """Of what closes a gate a controller may be told later; it clears completions by itself."""
         after = _Overlaid(changes, state)
         touched = [name for name, thing in self.truths.items() if thing in changes]
         values = ((name, self.is_true(name, after), self.is_true(name, state)) for name in touched)

@@ -276,43 +276,37 @@ class Things:
 
     @cached_property
     def late(self) -> tuple[str, ...]:
-        """The signals that a controller may be told later than another one that has changed with them."""
+        """The signals that a controller may be told later than they change."""
         late = {signal for changes in self.changing_together() for signal in self.told_late(changes)}
+        alone = (signal.name for signal in self.net.signals if signal.kind is SignalKind.SENSOR)
+        late |= {signal for signal in alone for value in (True, False) if self.told_late([(signal, value)])}
         return tuple(signal.name for signal in self.net.signals if signal.name in late)
 
     def told_late(self, changes: Collection[tuple[str, bool]]) -> set[str]:
-        """Of signals that change to these values: where one's old value and a sensor's new one may open a gate each;
-        then the completion, too, which is told when nothing is news of what sensors show."""
+        """Of signals that change to these values: where a gate may be open by one's old value; then the completion,
+        too, which is told when nothing is news of what sensors show. None where no sensor is among them."""
         read = {(gate.signal, gate.wanted) for t in self.net.transitions for gate in t.external}
-        new = {signal for signal, value in changes if (signal, value) in read and signal not in self.completions}
-        late = {signal for signal, value in changes if (signal, not value) in read and new != new & {signal}}
+        if all(signal in self.completions for signal, _ in changes):
+            return set()
+        late = {signal for signal, value in changes if (signal, not value) in read}
         return late | {signal for signal, _ in changes if late and signal in self.completions}
 
     def changing_together(self) -> Iterator[list[tuple[str, bool]]]:
-        """The signals that may change in one instant, and to what: wherever a workpiece goes."""
-        yield self.seen_of(None, self.model.arrivals.station)
-        yield self.seen_of(self.model.departures.station, None)
+        """The signals that change in one instant with a completion, and to what: where a workpiece goes, or is judged
+        no more."""
         for place in self.commanding:
+            if place.completion is None:
+                continue
             name, action = self.machine_of(place), self.action(place)
-            completed = [(place.completion, True)] if place.completion is not None else []
+            together = [(place.completion, True)]
             if isinstance(action, Carry):
-                yield completed + self.seen_of(name, action.target)
+                together += self.seen_of(name, action.target)
             elif isinstance(action, Process):
-                yield completed + [(name, False) for name in self.judging(action.station)]
+                together += [(name, False) for name in self.judging(action.station)]
             elif isinstance(action, Grasp | Put):
                 station = self.model.machines[name].positions[self.where(place, "at")]
-                way = (station, name) if isinstance(action, Grasp) else (name, station)
-                yield completed + self.seen_of(*way)
-        for t in self.net.transitions:
-            together: list[tuple[str, bool]] = []
-            for place in self.commanding:
-                if place.name in t.outputs and isinstance(action := self.action(place), Carry):
-                    together += self.seen_of(action.source, self.machine_of(place))
+                together += self.seen_of(station, name) if isinstance(action, Grasp) else self.seen_of(name, station)
             yield together
-        for station in sorted(self.judged):
-            found = self.judging(station)
-            yield [(name, True) for name in found if self.model.sensors[name].passes is not None]
-            yield [(name, True) for name in found if self.model.sensors[name].passes is None]
 
     def seen_of(self, source: str | None, target: str | None) -> list[tuple[str, bool]]:
         """What sensors that are no completions show at once, of a workpiece that goes."""

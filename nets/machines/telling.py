@@ -1,4 +1,4 @@
-"""Signals that change in one instant, and controllers that are told of them one after the other.
+"""Signals that change, and controllers that are told of them a moment later, of one after the other.
 
 When a gripper closes, its hand is full, the station empty and the command done, in one firing of the loop. No wire
 shows that at once: a controller is told one signal, may fire, and is told the next. What it does in between is in no
@@ -8,9 +8,14 @@ firing of its own, sensors in any order and the completion behind them: when a m
 can be seen, but for a sensor that may linger. Meanwhile the cell may fire and send commands; nothing happens at the
 machines before all is told, since a signal takes less time than a machine.
 
-Not every signal needs that. Where all that changes opens gates, it may as well be told in the instant itself: who fires
-later for it could have waited; and where all closes gates, who fires before it is told could have fired before the
-instant. A sensor that closes a gate while another opens one must be late: between them both are open.
+A sensor that closes a gate is told late, also where nothing else changes, and completions behind it. What only opens
+gates is told in the instant itself: who fires later for it could have waited. So is a completion with which no sensor
+changes: it says that its machine was done some time ago.
+
+Rejected: to tell what closes a gate in the instant, too, where no sensor opens another one, as who fires before it is
+told could have fired before the instant. The instant can be a firing of the cell, where a conveyor takes its workpiece:
+who waits for the token that it leaves could not. And a command means something else before: a stop that comes when the
+hand has closed leaves nothing undone.
 """
 
 from __future__ import annotations
@@ -18,6 +23,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from typing import Final
 
 from firable.nets.machines.laws import PLANT, Laws, fact
@@ -54,42 +60,37 @@ class Telling:
     @cached_property
     def late(self) -> tuple[str, ...]:
         """The signals that are told late in some firing, in the order of the net."""
-        found = frozenset[str]().union(*map(self.told_late, self._instants()))
+        alone = ([(signal, value)] for signal in {*self.truth} - self.completions for value in (True, False))
+        found = frozenset[str]().union(*map(self.told_late, chain(alone, self._completed())))
         return tuple(signal.name for signal in self.laws.net.signals if signal.name in found)
 
     def told_late(self, changes: Collection[Change]) -> frozenset[str]:
-        """Which of some signals that change together are told late: a gate that each closes may be open together with
-        one that a sensor opens that was told before; and completions behind such sensors."""
-        opening = {signal for signal, value in changes if (signal, value) in self.wanted} - self.completions
+        """Which of some signals that change together are told late: those that each close a gate, and completions
+        behind them; but a completion with which no sensor changes is told at once."""
+        changed = {signal for signal, _ in changes}
         closing = {signal for signal, value in changes if (signal, not value) in self.wanted}
-        late = {signal for signal in closing if opening - {signal}}
-        return frozenset(late | {signal for signal, _ in changes if signal in self.completions and late})
+        if not closing or changed <= self.completions:
+            return frozenset()
+        return frozenset(closing | changed & self.completions)
 
-    def _instants(self) -> Iterator[list[Change]]:
-        """What may change together, in each firing that moves a workpiece."""
-        model = self.laws.model
-        yield list(self._seen(None, model.arrivals.station))
-        yield list(self._seen(model.departures.station, None))
+    def _completed(self) -> Iterator[list[Change]]:
+        """What changes together with each completion."""
         for place in self.laws.commanding:
+            if place.completion is None:
+                continue
             name, _ = self.laws.machine(place)
-            done = [] if place.completion is None else [(place.completion, True)]
             match self.laws.action(place):
                 case Grasp():
-                    yield [*done, *self._seen(self.laws.station(place), name)]
+                    seen = [*self._seen(self.laws.station(place), name)]
                 case Put():
-                    yield [*done, *self._seen(name, self.laws.station(place))]
+                    seen = [*self._seen(name, self.laws.station(place))]
                 case Carry(target=target):
-                    yield [*done, *self._seen(name, target)]
+                    seen = [*self._seen(name, target)]
                 case Process(station=station):
-                    yield [*done, *((signal, False) for signal in self._judging(station))]
-        for transition in self.laws.net.transitions:
-            sent = (self.laws.net.place(name) for name in transition.outputs)
-            taken = ((self.laws.action(one), self.laws.machine(one)[0]) for one in sent if one.command is not None)
-            some = (self._seen(one.source, name) for one, name in taken if isinstance(one, Carry))
-            yield [change for changes in some for change in changes]
-        for station in model.stations:
-            for good in (True, False):
-                yield [(signal, True) for signal, passes in self._judging(station).items() if passes == good]
+                    seen = [(signal, False) for signal in self._judging(station)]
+                case _:
+                    continue
+            yield [(place.completion, True), *seen]
 
     def _seen(self, source: str | None, target: str | None) -> Iterator[Change]:
         """What sensors see at once of a workpiece that goes from one to the other."""

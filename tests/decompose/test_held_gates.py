@@ -56,7 +56,8 @@ def test_a_sensor_that_is_not_exact_breaks_its_assumption(
     assert broken.status is Status.VIOLATED
     assert "interlock" in broken.hint
     assert broken.witness is not None
-    assert broken.witness.firings[-1] == (f"{name.partition('/')[2]}/{move}",)
+    signal = name.partition("/")[2]
+    assert broken.witness.firings[-2:] == ((f"{signal}/{move}",), (f"{signal}/told/falls",))
     # An entry that seems to be taken lets the conveyor start with nothing on it.
     assert {verdict.name for verdict in verdicts.values() if not verdict.holds} == others
 
@@ -91,7 +92,7 @@ def test_a_judgement_that_machining_changes_after_the_vote_breaks_its_assumption
     assert broken.holds == holds
     if not holds:
         assert broken.witness is not None
-        assert broken.witness.firings[-1] == ("MC/done/mc.machining/mc_table-passed",)
+        assert broken.witness.firings[-2:] == (("MC/done/mc.machining/mc_table-passed",), ("mc.fine/told/falls",))
 
 
 def test_a_gate_that_another_machine_closes_is_found() -> None:
@@ -163,7 +164,7 @@ def test_the_gate_of_a_local_transition_that_the_coordinator_decides_is_asked_of
     broken = held_gates(decomposition, flickering).verdicts[0]
     assert broken.status is Status.VIOLATED
     assert broken.witness is not None
-    assert broken.witness.firings[-1] == ("a.door/drops",)
+    assert broken.witness.firings[-2:] == (("a.door/drops",), ("a.door/told/falls",))
 
 
 TWO_COMMAND_ONE_BELT = """\

@@ -8,11 +8,13 @@ loop would say nothing of the cell.
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
 import pytest
 from support import inspected_cell
+from support.stale_cells import carried, stopped
 from support.together_cell import together
 
 from firable.decompose.splitting.cut import split
@@ -159,3 +161,16 @@ def test_what_a_cell_does_between_two_signals_of_one_instant_is_in_the_loop(
     if first == "entry":
         with pytest.raises(AssertionError, match="the loop cannot fire lost here"):
             followed(close(net, plant, Faults.NONE, sending), trace)
+
+
+@pytest.mark.parametrize("sending", Sending)
+@pytest.mark.parametrize(("cell", "last"), [(carried, "still"), (stopped, "bad")])
+def test_what_a_cell_does_on_a_signal_that_is_a_moment_old_is_in_the_loop(
+    cell: Callable[[], tuple[Net, PlantModel]], last: str, sending: Sending
+) -> None:
+    """A conveyor takes its workpiece as its command is sent; a stop finds a robot that has just grasped."""
+    net, plant = cell()
+    state, trace = run_of(net, plant, 2)
+    fired = [name for event in trace.events if isinstance(event, Fired) for name in event.transitions]
+    assert (state, fired[-1]) == (State.DEADLOCK, last)
+    assert followed(close(net, plant, sending=sending), trace) == len(fired)
