@@ -185,19 +185,20 @@ def _note(loop: ClosedLoop, family: Family, about: str, witness: Witness) -> str
     ends = loop.accidents.get(last) or ": ".join(
         filter(None, (family.note.format(about), waiting(loop, witness.marking)))
     )
-    return "; ".join(filter(None, (ends, *between(loop, witness))))
+    return "; ".join(filter(None, (ends, *stale(loop, witness))))
 
 
-def between(loop: ClosedLoop, witness: Witness) -> Iterator[str]:
-    """What fires in a run of the loop between two signals of one instant, each as a sentence."""
+def stale(loop: ClosedLoop, witness: Witness) -> Iterator[str]:
+    """What fires in a run of the loop on a signal that has changed before the controller was told, as sentences."""
     player, marking = Player(loop.net), loop.net.initial_marking
-    own = {variant: name for name, variants in loop.variants.items() for variant in variants}
+    own = {variant: loop.cell.transition(name) for name, variants in loop.variants.items() for variant in variants}
     bits = {signal: 1 << loop.net.place_index[place] for signal, place in loop.news.items()}
     found = dict[str, None]()
     for fired in witness.firings if bits else ():
-        untold = listed([signal for signal, bit in bits.items() if marking & bit])
-        early = (own[name] for name in fired if name in own and untold)
-        found |= dict.fromkeys(f"{name} fires before a controller is told of {untold}" for name in early)
+        for transition in (own[name] for name in fired if name in own):
+            untold = listed([g.signal for g in transition.external if marking & bits.get(g.signal, 0)])
+            if untold:
+                found[f"{transition.name} fires before its controller is told that {untold} has changed"] = None
         marking = player.fire(marking, [loop.net.transition_index[name] for name in fired])
     yield from found
 
