@@ -83,6 +83,7 @@ def loop_report(
     from firable.analysis.cures.finding import with_circle
     from firable.analysis.loop.faults import ask_faults
     from firable.analysis.loop.verdicts import check_loop
+    from firable.nets.machines.plant_file import late_limits
     from firable.nets.verdict import held_to
 
     loaded, model = load_found(argument), read_machines(machines)
@@ -106,7 +107,7 @@ def loop_report(
         loaded.net,
         verdicts,
         discipline="interleaving",
-        notes=loaded.notes,
+        notes=(*loaded.notes, *late_limits(model, loaded.net)),
         files=files,
         loop_net=report.loop.net,
         positions=loaded.positions,

@@ -12,6 +12,7 @@ import click
 from firable.cli.files import MADE, READ
 from firable.cli.finite import FiniteRange
 from firable.cli.options import load_net, plant_for, write_text
+from firable.cli.text import show_diagnostic
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -92,12 +93,14 @@ def sim(
     from firable.executor.drivers.fitting import misfits as binding_misfits
     from firable.executor.operating.uncut import ended_by_signals
     from firable.nets.diagnostics import InputError
-    from firable.nets.machines.plant_file import misfits
+    from firable.nets.machines.plant_file import late_limits, misfits
 
     loaded = load_net(net).net
     model = read_machines(plant or plant_for(net, loaded.name))
     if problems := misfits(model, loaded):
         raise InputError(problems)
+    for late in late_limits(model, loaded):
+        show_diagnostic(late)
     disturbances = _disturbances(model, stuck, drop, hang)
     chosen = {"modbus": modbus, "opcua": opcua, "mqtt": mqtt, "serial": serial}
     protocols = [name for name, is_chosen in chosen.items() if is_chosen]

@@ -131,6 +131,7 @@ CODES: Final[dict[str, str]] = {
     "F5006": "a trace in which no machine is seen at work",
     "F5007": "a run that did not come to its end",
     "F5008": "machines that did what their plant file does not allow",
+    "F5009": "a time limit that the machine never keeps",
     "F5020": "a host that may not take part",
     "F5021": "a link that cannot be opened, or has failed",
     "F5022": "a link that is open to the network",

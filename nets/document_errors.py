@@ -376,6 +376,8 @@ def _wanted(kind: str, context: Mapping[str, Any], node: Node, path: Path) -> st
 def _number_wanted(is_whole: bool, context: Mapping[str, Any], path: Path) -> str:
     bounds = {"gt": "over", "ge": "from", "le": "to"}
     said = "".join([f" {word} {context[key]:.15g}" for key, word in bounds.items() if key in context])
+    if path[-1] == "likely":
+        return "a number from 0 to 1 is expected"
     if str(path[-1]).endswith("_s"):
         return f"a number of seconds{said}, without a unit, is expected"
     return f"a {'whole ' if is_whole else ''}number{said} is expected"

@@ -26,7 +26,7 @@ from typing import Annotated, Final, Literal, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, ValidationError
 
-from firable.nets.diagnostics import Diagnostic, InputError, Span, Subject, did_you_mean
+from firable.nets.diagnostics import Diagnostic, InputError, Severity, Span, Subject, did_you_mean
 from firable.nets.document import Name, OptionalName, given
 from firable.nets.document_errors import Shape, document_problems, keys_of, version_problem
 from firable.nets.net import Net, SignalKind
@@ -390,6 +390,30 @@ def _share(probability: float) -> str:
 def misfits(model: PlantModel, net: Net) -> tuple[Diagnostic, ...]:
     """Where a plant does not fit a net (F5003): a command it does not know, a sensor on one side only."""
     return (*_misfits_of_places(model, net), *_misfits_of_signals(model, net))
+
+
+def late_limits(model: PlantModel, net: Net) -> tuple[Diagnostic, ...]:
+    """Warnings of time limits that no command keeps (F5009): a check knows no times, and a run goes round for ever."""
+    found = []
+    for place in net.places:
+        command, limit = place.command, place.within
+        machine = None if command is None else model.machines.get(command.machine)
+        action = None if machine is None or command is None else machine.commands.get(command.command)
+        if command is None or limit is None or action is None or limit.seconds >= action.takes_s - action.jitter_s:
+            continue
+        given_s, least_s = f"{limit.seconds:.6g}", f"{action.takes_s - action.jitter_s:.6g}"
+        message = f"'{place.name}' gives '{command}' {given_s} s, and it takes {least_s} s at the least"
+        found.append(
+            Diagnostic(
+                "F5009",
+                f"{message}: it is late each time",
+                "give the place a longer `within`, or mend `takes_s`; a check with machines leaves times out",
+                ("places", place.name),
+                model.span(("machines", command.machine, "commands", command.command, "takes_s")),
+                severity=Severity.WARNING,
+            )
+        )
+    return tuple(found)
 
 
 def _misfits_of_places(model: PlantModel, net: Net) -> Iterator[Diagnostic]:

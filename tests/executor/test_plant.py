@@ -1,5 +1,6 @@
 """The simulated cell: the laws it obeys, the faults it raises, and the file that describes it."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -8,8 +9,8 @@ from support.plant_bench import TEXT, Bench
 from firable.executor.cell.disturbances import Drops, NeverCompletes, StuckSensor
 from firable.executor.cell.plant import CommandDone, SensorChanged, Workpiece
 from firable.nets.catalogue import catalogue_net, catalogue_path
-from firable.nets.diagnostics import InputError
-from firable.nets.machines.plant_file import misfits, parse_plant, read_plant
+from firable.nets.diagnostics import InputError, Severity
+from firable.nets.machines.plant_file import late_limits, misfits, parse_plant, read_plant
 
 CELLS = [
     *("one_robot", "one_robot_mc_late", "one_robot_mc_late_capacity", "two_robots_shared", "two_robots_separate"),
@@ -386,6 +387,30 @@ def test_machine_or_command_that_the_plant_lacks_is_said_at_the_table_to_add_it_
         assert words in problem.hint
 
 
+@pytest.mark.parametrize(
+    ("takes", "told"),
+    [
+        ("takes_s: 5.0, jitter_s: 0", False),
+        ("takes_s: 5.5, jitter_s: 0.5", False),
+        ("takes_s: 5.6, jitter_s: 0.5", True),
+        ("takes_s: 6", True),
+    ],
+)
+def test_time_limit_that_no_command_keeps_is_warned_of(takes: str, told: bool) -> None:
+    text, net = plant_path("one_robot_timed").read_text("utf-8"), catalogue_net("one_robot_timed")
+    assert not late_limits(parse_plant(text), net)
+    slow = re.sub(r"(MOVE: +\{does: move, +)[^}]*?(, may_fail|\})", rf"\g<1>{takes}\2", text, count=1)
+    assert slow != text
+    found = late_limits(parse_plant(slow), net)
+    limited = [place for place in net.places if place.within and place.within.seconds == 5]
+    assert {problem.subject for problem in found} == ({("places", place.name) for place in limited} if told else set())
+    for problem in found:
+        assert (problem.code, problem.severity) == ("F5009", Severity.WARNING)
+        assert "late each time" in problem.message
+        assert problem.span is not None
+        assert takes in slow.splitlines()[problem.span.line - 1]
+
+
 def test_hint_at_a_sensor_that_the_plant_lacks_names_all_that_one_can_see() -> None:
     lacking = parse_plant(plant_path("one_robot").read_text("utf-8").replace("  mc.part_present:", "  mc.part:"))
     hint = next(one.hint for one in misfits(lacking, catalogue_net("one_robot")) if "drives" in one.message)
@@ -434,9 +459,9 @@ def test_plant_file_that_contradicts_itself_is_refused_with_its_line(
         ("does: stop", "does: stop, may_fail: x", "F1008", "may_fail", "the keys here are does, takes_s, jitter_s"),
         ("{does: stop}", "\n      does: stop", "F1010", "STOP", "a mapping, lines of `name: value`"),
         ("plant: bench", "plant: bench\ncolour: red", "F1008", "colour", "unknown key 'colour'"),
-        ("{holding: R}", "{passes: table, likely: often}", "F1010", "often", "a number is expected"),
-        ("{holding: R}", "{passes: table, likely: 1.5}", "F1010", "1.5", "a number to 1 is expected"),
-        ("{holding: R}", "{passes: table, likely: -1}", "F1010", "-1", "a number from 0 is expected"),
+        ("{holding: R}", "{passes: table, likely: often}", "F1010", "often", "a number from 0 to 1 is expected"),
+        ("{holding: R}", "{passes: table, likely: 1.5}", "F1010", "1.5", "a number from 0 to 1 is expected"),
+        ("{holding: R}", "{passes: table, likely: -1}", "F1010", "-1", "a number from 0 to 1 is expected"),
         ("{holding: R}", "{passes: table, likely: }", "F1010", "likely", "leave `likely` out"),
         ("firable_plant: 1", "firable_plant: 2", "F1011", "2", "write `firable_plant: 1`"),
     ],
