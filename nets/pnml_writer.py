@@ -119,34 +119,59 @@ def _notes(net: Net, ids: dict[str, str]) -> Iterator[Diagnostic]:
     owned = sum(owner is not None for owner in owners)
     descriptions = [*(place.description for place in net.places), *(t.description for t in net.transitions)]
     lost = (
-        (gated, "transitions lose their external gates", "the file has its gates free"),
-        (len(net.signals), "signals are left out", "keep the net file"),
-        (owned, "places and signals lose their owner", "keep the net file: only it can be split"),
-        (sum(place.command is not None for place in net.places), "places lose their command", "keep the net file"),
+        (gated, "transition loses its", "transitions lose their", "external gates", "the file has its gates free"),
+        (len(net.signals), "signal is", "signals are", "left out", "keep the net file"),
+        (
+            owned,
+            "place or signal loses its",
+            "places and signals lose their",
+            "owner",
+            "keep the net file: only it can be split",
+        ),
+        (
+            sum(place.command is not None for place in net.places),
+            "place loses its",
+            "places lose their",
+            "command",
+            "keep the net file",
+        ),
         (
             sum(place.within is not None for place in net.places),
-            "places lose their time limit",
+            "place loses its",
+            "places lose their",
+            "time limit",
             "in the file a fault transition may fire at any time",
         ),
         (
             sum((p.task or p.resource) is not None for p in net.places),
-            "places lose what they open to",
+            "place loses what it opens",
+            "places lose what they open",
+            "to",
             "keep the net file",
         ),
-        (sum(t.number is not None for t in net.transitions), "transitions lose their number", "keep the net file"),
-        (len(net.arbiters), "arbiters are left out", "the file leaves conflicts open"),
-        (len(net.properties), "properties are left out", "keep the net file"),
-        (int(bool(net.description)), "description of the net is left out", "keep the net file"),
+        (
+            sum(t.number is not None for t in net.transitions),
+            "transition loses its",
+            "transitions lose their",
+            "number",
+            "keep the net file",
+        ),
+        (len(net.arbiters), "arbiter is", "arbiters are", "left out", "the file leaves conflicts open"),
+        (len(net.properties), "property is", "properties are", "left out", "keep the net file"),
+        (int(bool(net.description)), "description of the net is", "", "left out", "keep the net file"),
         (
             sum(map(bool, descriptions)),
-            "descriptions stand in the place of names",
+            "description stands",
+            "descriptions stand",
+            "in the place of names",
             "names are the identifiers of the file",
         ),
     )
-    for count, what, hint in lost:
+    for count, one, many, what, hint in lost:
         if count:
-            yield note(f"{count:,} {what}", hint)
-    renamed = [f"'{name}' is '{one}'" for name, one in ids.items() if name != one]
+            yield note(f"{count:,} {one if count == 1 else many} {what}", hint)
+    renamed = [f"'{name}' is '{new}'" for name, new in ids.items() if name != new]
     if renamed:
         some = ", ".join(renamed[:3]) + (", ..." if len(renamed) > 3 else "")
-        yield note(f"{len(renamed):,} names are no XML identifiers: {some}", "the names stand as <name> in the file")
+        told = "name is no XML identifier" if len(renamed) == 1 else "names are no XML identifiers"
+        yield note(f"{len(renamed):,} {told}: {some}", "the names stand as <name> in the file")

@@ -16,6 +16,7 @@ from firable.nets.catalogue import catalogue_names, catalogue_net
 from firable.nets.diagnostics import InputError, Severity
 from firable.nets.net import Net, Place, Transition
 from firable.nets.pnml import PnmlImport, parse_pnml, read_pnml, write_pnml
+from firable.nets.text import parse_net
 
 CONTACT = "contact rule"
 
@@ -344,8 +345,38 @@ def test_a_net_that_pnml_carries_whole_is_written_with_the_contact_note_only() -
 def test_all_that_is_lost_is_said() -> None:
     _, notes = write_pnml(catalogue_net("one_robot_mc_late"))
     said = " ".join(note.message for note in notes)
-    lost = ("external gates", "signals", "owner", "command", "number", "arbiters", "properties", "description")
+    lost = ("external gates", "signals", "owner", "command", "number", "arbiter", "properties", "description")
     assert [word for word in lost if word not in said] == []
+
+
+def test_one_that_is_lost_is_one_and_not_several() -> None:
+    text = """\
+firable: 1
+cell: one
+controllers:
+  robot:
+    start: free
+    inputs: key
+    places: {free: , busy: {send: {machine: R, command: GO}}}
+transitions:
+  go:   {number: 1, from: robot.free, to: robot.busy, if: robot.key, description: gone}
+  stay: {from: robot.busy, to: robot.free}
+arbiters:
+  only: {among: [go, stay], by: order}
+properties:
+  back: {always_possible: start}
+"""
+    told = [note.message for note in write_pnml(parse_net(text))[1]]
+    assert {line for line in told if line.startswith("1 ")} == {
+        "1 transition loses its external gates",
+        "1 signal is left out",
+        "1 place loses its command",
+        "1 transition loses its number",
+        "1 arbiter is left out",
+        "1 property is left out",
+        "1 description stands in the place of names",
+    }
+    assert "3 places and signals lose their owner" in told
 
 
 def test_a_self_loop_is_not_written() -> None:
