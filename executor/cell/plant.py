@@ -451,12 +451,8 @@ class Plant:
         self.found_good.pop(station, None)
         number, seconds = self.looks[station]
         self.looks[station] = number + 1, seconds
-        if self.stations[station] is None:
-            return
-        if seconds:
+        if self.stations[station] is not None:  # a look that takes no time is told of behind what made it begin
             self._in(seconds, 0.0, _Look(station, number + 1))
-        else:
-            self._find(station)
 
     def _find(self, station: str) -> None:
         self.found_good[station] = self.random.random() < self.likely[station]

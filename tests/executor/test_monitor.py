@@ -198,10 +198,10 @@ def test_a_camera_that_never_judges_is_told_of_when_it_should_have(after_seconds
 
 
 def test_a_camera_whose_judgement_gets_stuck_is_unexplained() -> None:
-    stuck = StuckSensor("camera.nok", value=True, from_seconds=2.0)
+    stuck = StuckSensor("camera.ok", value=True, from_seconds=2.0)
     found = inspected(inspected_cell.run(0, disturbances=[stuck]))
     assert found is not None
-    assert found.subject == "camera.nok"
+    assert found.subject == "camera.ok"
 
 
 @pytest.mark.parametrize("is_local", [False, True])
