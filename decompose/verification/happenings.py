@@ -81,6 +81,9 @@ class Plant(Things):
             yield f"{timer}/over", partial(self.over, timer)
         for name in self.late:
             yield f"{name}/told", partial(self.told, name)
+        for name, sensor in self.model.sensors.items():
+            if sensor.acknowledges is not None:
+                yield f"{name}/released", partial(self.released, name)
 
     def _in_the_plant(self) -> Iterator[tuple[str, Happens]]:
         for place in self.commanding:
@@ -104,7 +107,6 @@ class Plant(Things):
         for name, sensor in self.model.sensors.items():
             if sensor.acknowledges is not None:
                 yield f"{name}/pressed", partial(self.pressed, name)
-                yield f"{name}/released", partial(self.released, name)
             for way, may in (
                 ("drops", sensor.may_flicker),
                 ("returns", sensor.may_flicker),

@@ -343,7 +343,7 @@ class _Closing:
         for name, words, ways in self.telling.moves():
             yield from self.named(name, words, each(calm, ways))
         yield from self.workpieces(start)
-        yield from self.unsteady(start)
+        yield from self.unsteady(start, calm)
 
     def still_moves(self, name: str, place: Place, start: list[Moment]) -> Iterator[Transition]:
         """What a machine breaks off may be done or end in its accident until it is at rest, unless it has failed."""
@@ -374,8 +374,8 @@ class _Closing:
             judged = each(start, self.laws.judges(station)) if station in self.laws.judged else []
             yield from self.named(f"{station}/judged", f"the workpiece on {station} is judged", judged)
 
-    def unsteady(self, start: list[Moment]) -> Iterator[Transition]:
-        """What a sensor that is not exact does by itself."""
+    def unsteady(self, start: list[Moment], calm: list[Moment]) -> Iterator[Transition]:
+        """What a sensor that is not exact does by itself, and a key."""
         for name in self.inexact:
             sensor, bit, empty = self.model.sensors[name], self.bit(name).name, self.reality(name)
             ways = []
@@ -393,10 +393,11 @@ class _Closing:
         for name in self.keys:
             pressed = Case(((name, False), (self.let_go(name), True)), ((name, True), (self.let_go(name), False)))
             yield from self.named(f"{name}/pressed", f"{name} is pressed", each(start, [pressed]))
-            # The next command to the machine releases it: so it holds until what waits for it has fired (O4).
+            # The next command to the machine releases it: so it holds until what waits for it has fired (O4), and is
+            # told of in any order with what else comes of that command.
             idle = self.laws.idle(str(self.model.sensors[name].acknowledges))
             released = Case(((idle, False), *pressed.leaves), pressed.wants)
-            yield from self.named(f"{name}/released", f"{name} is released", each(start, [released]))
+            yield from self.named(f"{name}/released", f"{name} is released", each(calm, [released]))
 
     def times(self) -> Iterator[Transition]:
         """Any time can be over while a token waits for a completion that has not come: nothing is known of times."""

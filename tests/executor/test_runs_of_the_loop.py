@@ -17,16 +17,21 @@ from support import inspected_cell
 from support.stale_cells import carried, stopped
 from support.together_cell import together
 
+from firable.analysis.loop.verdicts import check_loop
 from firable.decompose.splitting.cut import split
+from firable.decompose.verification.happenings import Plant
+from firable.decompose.verification.same_loop import compare
 from firable.executor.cell.disturbances import Disturbance, NeverCompletes
 from firable.executor.operating.running import execute
 from firable.executor.operating.situation import State
 from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.machines.closing import close
 from firable.nets.machines.loop import ClosedLoop, Faults, Sending
-from firable.nets.machines.plant_file import PlantModel
+from firable.nets.machines.plant_file import PlantModel, parse_plant
 from firable.nets.machines.telling import Telling
 from firable.nets.net import Marking, Net
+from firable.nets.text import parse_net
+from firable.nets.verdict import Status
 from firable.semantics.player import Player
 from firable.semantics.trace import Fired, SignalChanged, Trace, parse_trace
 
@@ -174,3 +179,114 @@ def test_what_a_cell_does_on_a_signal_that_is_a_moment_old_is_in_the_loop(
     fired = [name for event in trace.events if isinstance(event, Fired) for name in event.transitions]
     assert (state, fired[-1]) == (State.DEADLOCK, last)
     assert followed(close(net, plant, sending=sending), trace) == len(fired)
+
+
+TAKEN_NET = """\
+firable: 1
+cell: taken
+controllers:
+  belt:
+    start: [rest, ready]
+    inputs: [entry, middle]
+    places:
+      rest:
+      ready:
+      feed:  {send: {machine: A, command: RUN}, until: fed}
+      run:   {send: {machine: B, command: RUN}UNTIL}
+      seen:
+      after:
+transitions:
+  first: {from: belt.rest, to: belt.feed, if: belt.entry}
+  go:    {from: belt.feed, to: GO, if: belt.middle}
+  see:   {SEE, if: belt.middle}
+properties:
+  never_after: {never: belt.after}
+"""
+TAKEN_PLANT = """\
+firable_plant: 1
+plant: taken
+stations: [entry, middle, exit]
+arrivals:   {station: entry, every_s: 400}
+departures: {station: exit, after_s: 1}
+machines:
+  A: {commands: {RUN: {does: carry, from: entry, to: middle, takes_s: 4}}}
+  B: {commands: {RUN: {does: carry, from: middle, to: exit, takes_s: 4}}}
+sensors:
+  belt.entry:  {occupied: entry}
+  belt.middle: {occupied: middle}
+"""
+
+
+@pytest.mark.parametrize(
+    ("until", "go", "see"),
+    [
+        ("", "belt.run", "from: belt.run, to: belt.after"),
+        (", until: carried", "[belt.run, belt.seen]", "from: belt.seen, to: belt.after"),
+        (", until: carried", "belt.run", "from: belt.ready, to: belt.after, unless: [belt.feed, belt.rest]"),
+    ],
+    ids=["takes", "beside", "empty"],
+)
+def test_what_fires_for_the_sake_of_a_command_that_is_sent_goes_by_what_was_seen_before(
+    until: str, go: str, see: str
+) -> None:
+    """A conveyor takes its workpiece when it is told to; who fires then has not been told that it has gone."""
+    text = TAKEN_NET.replace("UNTIL", until).replace("GO", go).replace("SEE", see)
+    net, plant = (
+        parse_net(text.replace("unless: belt.feed", "unless: [belt.feed, belt.rest]")),
+        parse_plant(TAKEN_PLANT),
+    )
+    state, trace = run_of(net, plant, 1)
+    fired = [name for event in trace.events if isinstance(event, Fired) for name in event.transitions]
+    assert (state, fired) == (State.DEADLOCK, ["first", "go", "see"])
+    for sending in Sending:
+        loop = close(net, plant, sending=sending)
+        assert followed(loop, trace) == 3
+        compare(Plant(net, plant, sending), loop)
+    assert check_loop(net, plant).verdict("loop.property.never_after").status is Status.VIOLATED
+
+
+def test_two_conveyors_that_both_see_a_workpiece_may_both_be_sent_for_it() -> None:
+    text = """\
+firable: 1
+cell: rivals
+controllers:
+  belt:
+    start: [one, two]
+    inputs: [left, right]
+    places:
+      one:
+      two:
+      run_a: {send: {machine: A, command: RUN}, until: done_a}
+      run_b: {send: {machine: B, command: RUN}, until: done_b}
+transitions:
+  a: {from: belt.one, to: belt.run_a, if: belt.left}
+  b: {from: belt.two, to: belt.run_b, if: belt.right}
+"""
+    sensors = "  belt.left: {occupied: entry}\n  belt.right: {occupied: entry}\n"
+    model = parse_plant(TAKEN_PLANT.partition("  belt.entry")[0].replace("from: middle", "from: entry") + sensors)
+    state, trace = run_of(parse_net(text), model, 1)
+    assert state is State.FAULT
+    assert any("where no workpiece lies" in str(event) for event in trace.events)
+    assert check_loop(parse_net(text), model).verdict("loop.accidents").status is Status.VIOLATED
+    for sending in Sending:
+        compare(Plant(parse_net(text), model, sending), close(parse_net(text), model, sending=sending))
+
+
+def test_a_camera_that_takes_no_time_is_told_of_behind_what_it_judges() -> None:
+    text = """\
+firable: 1
+cell: seen
+controllers:
+  eye: {start: rest, inputs: [good, there], places: {rest: , odd: }}
+transitions:
+  odd: {from: eye.rest, to: eye.odd, if: eye.good, unless: eye.there}
+properties:
+  never_odd: {never: eye.odd}
+"""
+    sensors = "  eye.good: {passes: entry, likely: 1}\n  eye.there: {occupied: entry}\n"
+    net, model = parse_net(text), parse_plant(TAKEN_PLANT.partition("  belt.entry")[0] + sensors)
+    assert check_loop(net, model).verdict("loop.property.never_odd").holds
+    state, trace = run_of(net, model, 1)
+    assert state is State.WAITING
+    seen = [event.signal for event in trace.events if isinstance(event, SignalChanged)]
+    assert seen == ["eye.there", "eye.good"]
