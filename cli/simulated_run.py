@@ -74,6 +74,9 @@ def show_simulated(report: Report) -> None:
         click.echo(f"  trace {file}")
 
 
+_HELD_HINT = "the same command with `--resume` goes on, once `--say` has told of what no machine can tell of"
+
+
 def _told(_kind: str, sentence: str) -> None:
     """One line of what happens, as it happens."""
     click.echo(f"  {sentence}", err=True)
@@ -115,6 +118,7 @@ def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, .
             method,
             bound=reached if ended is Status.UNKNOWN else "",
             subjects=(*_why(report), *map(str, report.situation.blocked)) if ended is Status.VIOLATED else (),
+            hint=_HELD_HINT if report.state is State.HELD else "",
         ),
         Verdict(
             "workpieces-intact",

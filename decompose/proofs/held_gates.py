@@ -2,10 +2,10 @@
 
 A part votes yes when it is firable and its gates are open. Its promise holds the places; whether a gate stays open is
 the machines' matter. In the closed loop this is a question about single firings: is there a reachable marking in which
-the part could have voted, its places as it found them and the gate open, and a move of a machine, a workpiece or a
-sensor that closes the gate? If there is none, then a gate that was open at the vote is open when the transition fires,
-by induction over the firings between; so the assumption is proved, for these machines. If there is one, the run to it
-is shown, with the move that closes the gate at its end.
+the part could have voted, its places as it found them, the gate and its completions open, and a move of a machine, a
+workpiece or a sensor that closes the gate? If there is none, then a gate that was open at the vote is open when the
+transition fires, by induction over the firings between; so the assumption is proved, for these machines. If there is
+one, the run to it is shown, with the move that closes the gate at its end.
 
 Gates of completions are asked as well, all in one verdict: that a completion is cleared only by sending its command,
 which the promise excludes, is what the list of assumptions leaves out by reasoning, and here it is confirmed.
@@ -34,7 +34,7 @@ from firable.nets.formula import And, Firable, Formula, Holds, Not
 from firable.nets.machines.closing import close
 from firable.nets.machines.loop import ClosedLoop, Sending
 from firable.nets.machines.plant_file import PlantModel
-from firable.nets.net import SignalKind, Transition
+from firable.nets.net import ExternalGate, Net, SignalKind, Transition
 from firable.nets.verdict import Status, Verdict, Witness
 from firable.semantics.player import Player
 
@@ -42,6 +42,7 @@ COMPLETIONS = "o4.completions"
 COMMANDS = "o4.commands"
 EVIDENCE = "o4.evidence.json"
 _HINT = "put the interlock into the machine's own controller, or make the signal one that a command clears"
+_BARE_HINT = "let the controller that reads '{}' give a token to '{}': without one it may have voted long before"
 
 
 def name_of(assumption: Assumption) -> str:
@@ -80,12 +81,14 @@ def held_gates(decomposition: Decomposition, model: PlantModel, budget: Budget |
     families = []
     for one in assumptions(decomposition):
         asked = never(name_of(one), _closed_after_vote(loop, decomposition, rows[one.transition], one))
-        families.append(Family(name_of(one), str(one), {one.signal: asked}, hint=_HINT))
+        part = _part(decomposition, rows[one.transition], decomposition.net.signal(one.signal).owner)
+        hint = _HINT if part.inputs else _BARE_HINT.format(one.signal, one.transition)
+        families.append(Family(name_of(one), str(one), {one.signal: asked}, hint=hint))
     completions = [
         Assumption(row.name, gate.signal, gate.wanted)
         for row in decomposition.coordinated
         for gate in decomposition.net.transition(row.name).external
-        if gate.wanted and decomposition.net.signal(gate.signal).kind is SignalKind.COMPLETION
+        if _is_completion(decomposition.net, gate)
     ]
     families.append(
         Family(
@@ -121,13 +124,21 @@ def _part(decomposition: Decomposition, row: Coordinated, controller: str | None
     raise ValueError(f"'{row.name}' has no part at '{controller}', which owns one of its signals")
 
 
-def _vote(loop: ClosedLoop, part: Transition, one: Assumption) -> Formula:
-    """The part is firable and the gate is open, as its owner found them."""
-    place, means = loop.shown[one.signal]
-    open_ = Holds(place) if means == one.wanted else Not(Holds(place))
+def _vote(loop: ClosedLoop, net: Net, part: Transition, one: Assumption) -> Formula:
+    """The part is firable and the gate is open, as its owner found them; so are those of its completions, which stay
+    open where the verdict on them holds, and of which nothing but themselves is assumed there."""
+    gates = [(one.signal, one.wanted)]
+    if not _is_completion(net, one):
+        gates += [(gate.signal, True) for gate in part.external if gate.wanted and _is_completion(net, gate)]
+    shown = ((*loop.shown[signal], wanted) for signal, wanted in gates)
+    open_ = (Holds(place) if means == wanted else Not(Holds(place)) for place, means, wanted in shown)
     read = (*part.inputs, *part.permissive)
     bare = (*part.outputs, *part.inhibitive, *(loop.unsent[name] for name in read if name in loop.unsent))
-    return all_of((*map(Holds, read), *(Not(Holds(name)) for name in bare), open_, Not(ENDED)))
+    return all_of((*map(Holds, read), *(Not(Holds(name)) for name in bare), *open_, Not(ENDED)))
+
+
+def _is_completion(net: Net, gate: Assumption | ExternalGate) -> bool:
+    return gate.wanted and net.signal(gate.signal).kind is SignalKind.COMPLETION
 
 
 def _closing(loop: ClosedLoop, one: Assumption) -> Iterator[str]:
@@ -140,7 +151,7 @@ def _closing(loop: ClosedLoop, one: Assumption) -> Iterator[str]:
 
 def _closed_after_vote(loop: ClosedLoop, decomposition: Decomposition, row: Coordinated, one: Assumption) -> Formula:
     part = _part(decomposition, row, decomposition.net.signal(one.signal).owner)
-    return And((_vote(loop, part, one), any_of(map(Firable, _closing(loop, one)))))
+    return And((_vote(loop, decomposition.net, part, one), any_of(map(Firable, _closing(loop, one)))))
 
 
 def _shown(loop: ClosedLoop, decomposition: Decomposition, verdict: Verdict, ones: tuple[Assumption, ...]) -> Verdict:

@@ -189,15 +189,19 @@ def _never(name: str, formula: Formula) -> Property:
 
 
 def _closes_after_vote(cut: Cut, loop: ClosedLoop, name: str, gate: ExternalGate) -> Formula:
-    """The part of the owner of a signal could vote, and a move may close its gate."""
+    """The part of the owner of a signal could vote, its completions there, and a move may close its gate."""
     owner = cut.owner[gate.signal]
     part = next(part.name for part in cut.parts[name] if part.controller == owner)
     own = next(subnet for subnet in cut.subnets if subnet.name == owner).transition(part)
     full = (*own.inputs, *own.permissive)
     empty = (*own.outputs, *own.inhibitive, *(loop.unsent[place] for place in full if place in loop.unsent))
     shown, means = loop.shown[gate.signal]
-    open_ = Holds(shown) if means == gate.wanted else Not(Holds(shown))
-    votes = And((*map(Holds, full), *(Not(Holds(place)) for place in empty), open_, Not(_ENDED)))
+    open_ = [Holds(shown) if means == gate.wanted else Not(Holds(shown))]
+    kinds = {signal.name: signal.kind for signal in cut.net.signals}
+    if not (gate.wanted and kinds[gate.signal] is SignalKind.COMPLETION):  # of these is asked with nothing beside them
+        awaited = [one.signal for one in own.external if one.wanted and kinds[one.signal] is SignalKind.COMPLETION]
+        open_ += [Holds(place) if so else Not(Holds(place)) for place, so in map(loop.shown.__getitem__, awaited)]
+    votes = And((*map(Holds, full), *(Not(Holds(place)) for place in empty), *open_, Not(_ENDED)))
     closing = tuple(
         Firable(move.name)
         for move in loop.net.transitions

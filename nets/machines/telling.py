@@ -142,8 +142,8 @@ class Telling:
             before = [other for other in self.late if signal in self.completions and other not in self.completions]
             wants = ((news, True), *((_news(other), False) for other in before))
             ways = tuple(
-                Case((*wants, (place, means == value), (told, not value)), ((news, False), (told, value)), word)
-                for value, word in ((True, "rises"), (False, "falls"))
+                Case((*wants, (place, means == value), (told, not value)), ((news, False), (told, value)), word, says)
+                for value, word, says in ((True, "rises", "now 1"), (False, "falls", "now 0"))
             )
             yield f"{signal}/told", f"the controller is told of {signal}", ways
 

@@ -5,7 +5,7 @@ from functools import cache
 from hashlib import sha256
 
 import pytest
-from support import inspected_cell
+from support import inspected_cell, together_cell
 from support.bench_cell import PLANT as BENCH
 from support.bundle_mutants import evidence_mutants, verdict_mutants
 from support.examples import some
@@ -17,6 +17,7 @@ from firable.analysis.goal import Limits
 from firable.decompose.bundling import make_bundle
 from firable.decompose.proofs import closed_loops
 from firable.decompose.proofs.closed_loops import sealed_loops
+from firable.decompose.proofs.held_gates import held_gates
 from firable.decompose.splitting.cut import split
 from firable.decompose.verification import documents, machines, same_loop
 from firable.decompose.verification.checked import Examination
@@ -41,7 +42,7 @@ from firable.nets.interchange import net_digest
 from firable.nets.machines.closing import close
 from firable.nets.machines.laws import Laws
 from firable.nets.machines.loop import ClosedLoop, Faults, Sending
-from firable.nets.machines.plant_file import PlantModel
+from firable.nets.machines.plant_file import PlantModel, parse_plant
 from firable.nets.net import Net
 from firable.nets.text import parse_net
 from firable.nets.verdict import Status
@@ -132,6 +133,46 @@ def test_a_bundle_with_its_machines_is_shown() -> None:
         assert checked[f"fault.{machine}.repaired"].verdict.holds
     assert all(checked[name].shown for name in names)
     assert all("closed anew with plant.yaml" in checked[name].method for name in names)
+
+
+HELD_BY_A_COMPLETION = """\
+firable: 1
+cell: held
+controllers:
+  sys: {coordinator: true, start: s, places: {s: , u: }}
+  robot:
+    start: free
+    inputs: [entry, holds]
+    places:
+      free:
+      grasp:   {send: {machine: R, command: GRASP, at: ENTRY}, until: grasped}
+      to_exit: {send: {machine: R, command: MOVE,  to: EXIT},  until: there}
+      put:     {send: {machine: R, command: PUT,   at: EXIT},   until: placed}
+      back:    {send: {machine: R, command: MOVE,  to: ENTRY}, until: there}
+transitions:
+  come: {from: [robot.free, sys.s], to: [robot.grasp, sys.u], if: robot.entry}
+  t1:   {from: robot.grasp, to: robot.to_exit}
+  t2:   {from: robot.to_exit, to: robot.put}
+  stay: {from: [robot.put, sys.u], to: [robot.back, sys.s], if: robot.holds}
+  t3:   {from: [robot.put, sys.u], to: [robot.back, sys.s], unless: robot.holds}
+  t4:   {from: robot.back, to: robot.free}
+arbiters:
+  which: {among: [t3, stay], by: priority}
+"""
+
+
+@pytest.mark.usefixtures("remembering")
+def test_a_gate_that_closes_while_the_completion_of_its_part_is_still_to_come_closes_for_no_vote() -> None:
+    """The hand is empty when the robot is done with laying down, and nobody votes before it is."""
+    net = parse_net(HELD_BY_A_COMPLETION)
+    verdicts = {one.name: one for one in held_gates(split(net), parse_plant(together_cell.PLANT)).verdicts}
+    assert verdicts["o4.stay/robot.holds"].holds
+    bundle = make_bundle(check(net), plant=together_cell.PLANT)
+    assert not refused(bundle)
+    assert {"o4.stay/robot.holds", "o4.t3/robot.holds"} < {one.name for one in bundle.verdicts}
+    at_any_time = parse_net(HELD_BY_A_COMPLETION.replace(",   until: placed", ""))
+    verdicts = {one.name: one for one in held_gates(split(at_any_time), parse_plant(together_cell.PLANT)).verdicts}
+    assert verdicts["o4.stay/robot.holds"].status is Status.VIOLATED, "without it they do"
 
 
 @pytest.mark.usefixtures("remembering")
