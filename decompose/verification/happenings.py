@@ -137,18 +137,19 @@ class Plant(Things):
         late = self.told_late([(name, value) for name, value in new.items() if value or name not in self.completions])
         if not late <= {*self.late}:
             raise DiffersError(f"{', '.join(sorted(late - {*self.late}))} may be told late, and was not expected to be")
-        more: Changes = {}
+        ways: list[Changes] = [{}]
         for name in new.keys() & {*self.late}:
             told, news = f"told {name}", f"news of {name}"
-            if state[news]:
-                more[news] = False  # it is again what the controller knows
+            is_known = bool(state[told]) == new[name]
+            if state[news]:  # it is again what the controller knows, or other news is still to come
+                stay: list[Changes] = [{}] if name not in self.completions else []
+                over: list[Changes] = [{news: False}] if is_known else []
+                ways = [{**way, **one} for way in ways for one in (*stay, *over)]
             elif name in late:
-                more[news] = True
-            elif bool(state[told]) != new[name]:
-                more[told] = new[name]
-            else:
-                return  # what is no news is known
-        yield changes | more
+                ways = [{**way, news: True} for way in ways]
+            else:  # what is no news is known
+                ways = [{**way, told: new[name]} for way in ways if not is_known]
+        yield from (changes | way for way in ways)
 
     def told(self, name: str, state: State) -> Iterator[Changes]:
         """A controller is told of a signal that has changed, of a completion when the sensors have been told."""
@@ -156,8 +157,12 @@ class Plant(Things):
             state[f"news of {one}"] for one in self.late if one not in self.completions
         ):
             return
-        if state[f"news of {name}"] and bool(state[f"told {name}"]) != (value := self.is_true(name, state)):
+        if not state[f"news of {name}"]:
+            return
+        if bool(state[f"told {name}"]) != (value := self.is_true(name, state)):
             yield {f"news of {name}": False, f"told {name}": value}
+        elif name not in self.completions:  # it was different meanwhile
+            yield {f"told {name}": not value}
 
     def fires(self, t: Transition, state: State) -> Iterator[Changes]:
         """Eq. (1)-(4), gates as the signals show them, once the commands of what it takes or reads have been sent."""

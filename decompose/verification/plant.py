@@ -76,7 +76,7 @@ class Things:
                 found[f"key {name}"] = {True: name, False: f"plant.{name}.released"}
             elif sensor.may_flicker or sensor.may_linger:
                 found[f"bit {name}"] = {True: f"plant.{name}.sensor" if name in self.completions else name}
-        found |= {f"told {name}": {True: f"plant.{name}.told"} for name in self.late}
+        found |= {f"told {name}": {True: f"plant.{name}.told_1", False: f"plant.{name}.told_0"} for name in self.late}
         found |= {f"news of {name}": {True: f"plant.{name}.news"} for name in self.late}
         found |= {f"acknowledged {name}": {True: f"plant.{name}.acknowledged"} for name in self.sensed}
         if self.sending is Sending.LATE:

@@ -132,25 +132,33 @@ class Telling:
         """What controllers were told of signals that are told late, and of which there is news."""
         for signal in self.late:
             yield fact(_told(signal), f"the controller was told that {signal} is 1")
+            yield fact(_told(signal, value=False), f"the controller was told that {signal} is 0", marked=True)
             yield fact(_news(signal), f"{signal} has changed, and its controller is still to be told")
 
     def moves(self) -> Iterator[tuple[str, str, tuple[Case, ...]]]:
-        """For each signal that is told late the firing in which it is, its description, and its ways."""
+        """For each signal that is told late the firing in which it is, its description, and its ways.
+
+        There is news of what is as the controller knows it where it was different in between.
+        """
         for signal in self.late:
             place, means = self.truth[signal]
-            news, told = _news(signal), _told(signal)
+            news = _news(signal)
             before = [other for other in self.late if signal in self.completions and other not in self.completions]
             wants = ((news, True), *((_news(other), False) for other in before))
-            ways = tuple(
-                Case((*wants, (place, means == value), (told, not value)), ((news, False), (told, value)), word, says)
-                for value, word, says in ((True, "rises", "now 1"), (False, "falls", "now 0"))
-            )
-            yield f"{signal}/told", f"the controller is told of {signal}", ways
+            ways = list[Case]()
+            for value, word, was in ((True, "rises", "rose"), (False, "falls", "fell")):
+                is_so, is_not = (place, means == value), (place, means != value)
+                known, learns = _knows(signal, value=not value), _knows(signal, value=value)
+                ways.append(Case((*wants, is_so, *known), ((news, False), *learns), word, f"now {value:d}"))
+                if signal not in self.completions:
+                    ways.append(Case((*wants, is_not, *known), learns, was, f"{value:d} a moment ago"))
+            yield f"{signal}/told", f"the controller is told of {signal}", tuple(ways)
 
     def of(self, moment: Moment) -> list[Moment]:
         """A firing with what controllers are told of it in the firing itself; what is told late is news.
 
-        Of what was news already, and changes back, there is nothing more to tell.
+        Of what was news already, and changes back, there is nothing more to tell, or all of it still; but a completion
+        that the controller clears before it was told of it is over.
         """
         changes = dict(self._changes(moment))
         late = self.told_late([one for one in changes.items() if one[1] or one[0] not in self.completions])
@@ -158,11 +166,14 @@ class Telling:
         for signal, value in changes.items():
             if signal not in self.late:
                 continue
-            news, told = _news(signal), _told(signal)
-            at_once = Case(((news, False), (told, not value)), ((told, value),))
+            news = _news(signal)
+            at_once = Case(((news, False), *_knows(signal, value=not value)), _knows(signal, value=value))
             later = Case(((news, False),), ((news, True),))
-            back = Case(((news, True),), ((news, False),), f"{signal}-{_STILL}")
-            moments = each(moments, [later if signal in late else at_once, back])
+            ways = [later if signal in late else at_once]
+            ways.append(Case(((news, True), *_knows(signal, value=value)), ((news, False),), f"{signal}-untold"))
+            if signal not in self.completions:
+                ways.append(Case(((news, True),), (), f"{signal}-{_STILL}"))
+            moments = each(moments, ways)
         return moments
 
     def _changes(self, moment: Moment) -> Iterator[Change]:
@@ -171,9 +182,14 @@ class Telling:
                 yield signal, moment.after[place] == means
 
 
-def _told(signal: str) -> str:
-    """The place that holds a token iff the controller was told last that a signal is 1."""
-    return f"{PLANT}.{signal}.told"
+def _told(signal: str, *, value: bool = True) -> str:
+    """The place that holds a token iff the controller was told last that a signal is 1, or that it is 0."""
+    return f"{PLANT}.{signal}.told_{int(value)}"
+
+
+def _knows(signal: str, *, value: bool) -> tuple[Literal, Literal]:
+    """What the controller was told last of a signal; with two places, no firing that tells it is ever in contact."""
+    return (_told(signal), value), (_told(signal, value=False), not value)
 
 
 def _news(signal: str) -> str:

@@ -27,12 +27,12 @@ from firable.nets.verdict import Status
 from firable.semantics.player import Player
 
 SIZES = {
-    "one_robot": (98, 195, 903, 2218),
-    "one_robot_mc_late": (97, 193, 2121, 6158),
-    "one_robot_mc_late_capacity": (98, 195, 903, 2218),
-    "one_robot_timed": (112, 269, 2527, 7407),
-    "two_robots_shared": (111, 175, 2007, 5598),
-    "two_robots_separate": (111, 175, 2007, 5598),
+    "one_robot": (101, 199, 903, 2218),
+    "one_robot_mc_late": (100, 197, 2121, 6158),
+    "one_robot_mc_late_capacity": (101, 199, 903, 2218),
+    "one_robot_timed": (116, 277, 2527, 7440),
+    "two_robots_shared": (114, 179, 2007, 5598),
+    "two_robots_separate": (114, 179, 2007, 5598),
 }
 
 

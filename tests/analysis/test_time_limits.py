@@ -175,7 +175,7 @@ def test_a_timer_that_something_else_reads_is_set_while_its_place_waits_and_clea
 
 def test_a_key_is_pressed_at_any_time_and_released_by_the_next_command() -> None:
     loop = close(timed(), catalogue_plant("one_robot_timed"))
-    assert loop.net.transition("robot.reset/pressed").outputs == ("robot.reset", "plant.robot.reset.told")
+    assert loop.net.transition("robot.reset/pressed").outputs == ("robot.reset", "plant.robot.reset.told_1")
     assert "plant.R.idle" in loop.net.transition("robot.reset/released").inhibitive
     assert ExternalGate("robot.reset") in timed().transition("t1-e").external
 

@@ -37,7 +37,7 @@ def wrong_plant(tmp_path: Path) -> str:
 def test_the_loop_is_told_beside_the_net_with_gates_free(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", CELL, "--machines", PLANT]) == 0
     told = capsys.readouterr().out
-    assert "the loop has 98 places, 195 transitions, 903 markings and 2,218 edges" in told
+    assert "the loop has 101 places, 199 transitions, 903 markings and 2,218 edges" in told
     assert "  deadlock-free                       proved      proved\n" in told
     assert "✓ proved    fault.MC.repaired" in told
     assert told.endswith("all hold: 17 proved\n")

@@ -112,7 +112,7 @@ def test_the_firing_that_enters_a_place_starts_its_machine_and_clears_its_comple
     assert bare.inputs == ("robot.to_cv1", "plant.R.idle")
     assert "robot.touch" in bare.inhibitive
     assert clearing.name == "t1-a/clears-robot.touch"
-    assert clearing.inputs == ("robot.to_cv1", "robot.touch", "plant.R.idle", "plant.robot.touch.told")
+    assert clearing.inputs == ("robot.to_cv1", "robot.touch", "plant.R.idle", "plant.robot.touch.told_1")
 
 
 def test_traces_map_back_to_the_names_of_the_cell() -> None:
@@ -122,8 +122,8 @@ def test_traces_map_back_to_the_names_of_the_cell() -> None:
 
 def test_a_gate_goes_by_what_its_controller_was_told() -> None:
     g4 = loop_of("one_robot").net.transition("G4")
-    assert loop_of("one_robot").shown["mc.part_present"] == ("plant.mc.part_present.told", True)
-    assert "plant.mc.part_present.told" in g4.permissive
+    assert loop_of("one_robot").shown["mc.part_present"] == ("plant.mc.part_present.told_1", True)
+    assert "plant.mc.part_present.told_1" in g4.permissive
 
 
 def test_a_sensor_that_may_flicker_is_a_bit_that_drops_and_returns() -> None:
@@ -340,12 +340,12 @@ sensors:
 
 def test_a_workpiece_is_found_good_or_not_some_time_after_it_has_come() -> None:
     loop = close(inspected_cell.net(), inspected_cell.plant())
-    assert loop.shown["camera.ok"] == ("plant.camera.ok.told", True)
-    assert loop.shown["camera.nok"] == ("plant.camera.nok.told", True)
-    assert "plant.camera.nok.told" in loop.net.transition("reject").permissive
+    assert loop.shown["camera.ok"] == ("plant.camera.ok.told_1", True)
+    assert loop.shown["camera.nok"] == ("plant.camera.nok.told_1", True)
+    assert "plant.camera.nok.told_1" in loop.net.transition("reject").permissive
     good, bad = (loop.net.transition(f"table/judged/{found}") for found in ("passes", "fails"))
-    assert good.outputs == ("plant.table.passes", "plant.camera.ok.told"), "what opens a gate is told at once"
-    assert bad.outputs == ("plant.table.fails", "plant.camera.nok.told")
+    assert good.outputs == ("plant.table.passes", "plant.camera.ok.told_1"), "what opens a gate is told at once"
+    assert bad.outputs == ("plant.table.fails", "plant.camera.nok.told_1")
     for one in (good, bad):
         assert {"plant.table.empty", "plant.table.passes", "plant.table.fails"} < {*one.inhibitive, *one.outputs}
     assert bad.description == "the workpiece on table is judged, and is not found good"

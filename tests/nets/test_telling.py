@@ -12,7 +12,7 @@ from firable.analysis.loop.verdicts import check_loop
 from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.machines.closing import close
 from firable.nets.machines.loop import ClosedLoop
-from firable.nets.machines.plant_file import PlantModel
+from firable.nets.machines.plant_file import PlantModel, parse_plant
 from firable.nets.machines.telling import Telling
 from firable.nets.net import Net, SignalKind
 from firable.nets.text import parse_net
@@ -60,8 +60,8 @@ def test_a_sensor_that_closes_a_gate_is_told_late_and_its_completion_behind_it(g
 
 def test_what_only_opens_gates_is_told_in_the_instant() -> None:
     loop = close(*carried())
-    told = {"plant.belt.table.news", "plant.belt.table.told"}
-    assert told & {*loop.net.transition("A/done/belt.bring").outputs} == {"plant.belt.table.told"}
+    told = {"plant.belt.table.news", "plant.belt.table.told_1"}
+    assert told & {*loop.net.transition("A/done/belt.bring").outputs} == {"plant.belt.table.told_1"}
     assert told & {*loop.net.transition("go").outputs} == {"plant.belt.table.news"}
 
 
@@ -75,6 +75,56 @@ def test_a_cell_that_fires_on_what_a_sensor_showed_a_moment_ago_is_found(
     assert verdict.witness is not None
     assert verdict.witness.firings[-1] == (last,)
     assert report.verdict("loop.accidents").holds
+
+
+PASSING_NET = """\
+firable: 1
+cell: passing
+controllers:
+  belt:
+    start: rest
+    inputs: [entry, there, seen]
+    places:
+      rest:
+      feed: {send: {machine: A, command: RUN}}
+      run:  {send: {machine: B, command: RUN}, until: carried}
+      gone:
+      back:
+transitions:
+  first: {from: belt.rest, to: belt.feed, if: belt.entry}
+  go:    {from: belt.feed, to: belt.run, if: belt.there}
+  end:   {from: belt.run, to: belt.gone, unless: belt.seen}
+  again: {from: belt.gone, to: belt.back, if: belt.seen}
+properties:
+  never_back: {never: belt.back}
+"""
+PASSING_PLANT = """\
+firable_plant: 1
+plant: passing
+stations: [entry, table, exit]
+arrivals:   {station: entry, every_s: 4}
+departures: {station: exit, after_s: 1}
+machines:
+  A: {commands: {RUN: {does: carry, from: entry, to: table, takes_s: 4}}}
+  B: {commands: {RUN: {does: carry, from: table, to: exit,  takes_s: 4}}}
+sensors:
+  belt.entry: {occupied: entry}
+  belt.there: {occupied: table}
+  belt.seen:  {occupied: table}
+"""
+
+
+def test_what_has_come_and_gone_before_a_controller_was_told_it_may_be_told_still() -> None:
+    """The belt takes the workpiece that one sensor has shown, before the controller is told what the other one saw."""
+    text = PASSING_NET.replace(", until: carried", "")
+    report = check_loop(parse_net(text), parse_plant(PASSING_PLANT))
+    verdict = report.verdict("loop.property.never_back")
+    assert verdict.status is Status.VIOLATED
+    assert verdict.witness is not None
+    names = [name for (name,) in verdict.witness.firings]
+    assert names[-4:] == ["go/belt.seen-still-to-be-told", "end", "belt.seen/told/rose", "again"]
+    waits = check_loop(parse_net(PASSING_NET), parse_plant(PASSING_PLANT))
+    assert waits.verdict("loop.property.never_back").holds, "who waits for the completion was told before"
 
 
 @pytest.mark.parametrize("name", CELLS)
