@@ -29,6 +29,8 @@ from firable.nets.drawing.shapes import (
     BYPASS_FIRST,
     BYPASS_STEP,
     LABEL_LEFT,
+    STUB_LINE,
+    WORDS_LINE,
     Bar,
     Edge,
     Kind,
@@ -44,6 +46,8 @@ FREE: Final = Arrangement()
 """An arrangement in which nothing is settled."""
 _BYPASS_HALF_WIDTH: Final = 5.0
 _ROW_HEIGHT: Final = 94.0
+_WORDS_APART: Final = 21.0
+"""From the last line of words to the middle of the bar below, whose first signal stands between."""
 _EMPTY_ROW_HEIGHT: Final = 56.0
 _EDGE_ROW_HEIGHT: Final = 34.0
 _LANE_GAP: Final = 14.0
@@ -269,7 +273,7 @@ class _Layouter:
         y_of_row = [_TITLE_HEIGHT + _HEADER_HEIGHT]
         for gap in range(self.row_count + 1):
             empty = _EMPTY_ROW_HEIGHT if 0 < gap < self.row_count else _EDGE_ROW_HEIGHT
-            y_of_row.append(y_of_row[-1] + (_ROW_HEIGHT if gap in occupied else empty))
+            y_of_row.append(y_of_row[-1] + (max(_ROW_HEIGHT, self._room(gap)) if gap in occupied else empty))
         bypass = self._bypasses()
         lanes, centre, margin, width = self._columns(bypass)
         places = tuple(
@@ -292,6 +296,16 @@ class _Layouter:
         )
         bars = tuple(self._bar(t, y_of_row[self.rows[t]], edges, centre) for t in range(len(net.transitions)))
         return Layout(lanes, places, bars, edges, stubs, margin, _TITLE_HEIGHT, y_of_row[-1], width)
+
+    def _room(self, gap: int) -> float:
+        """The height of a gap in which no words of a place touch the signals at the bars below, on its track."""
+        slots: dict[int, int] = {}
+        for t, gates in enumerate(self.gates):
+            for gate in gates if self.rows[t] == gap + 1 else ():
+                slots[gate.track] = max(slots.get(gate.track, 0), gate.slot)
+        beside = [p for p, of in enumerate(self.gaps) if of == gap and self.track_of[p] in slots]
+        halves = (len(self._place_words(p)) * WORDS_LINE / 2 + slots[self.track_of[p]] * STUB_LINE for p in beside)
+        return 2 * (max(halves, default=0.0) + _WORDS_APART)
 
     def _bypasses(self) -> list[tuple[int, int, Kind, int]]:
         found = []

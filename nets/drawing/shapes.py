@@ -20,6 +20,8 @@ BAR_HALF_HEIGHT: Final = 3.5
 BYPASS_FIRST: Final = 34.0
 BYPASS_STEP: Final = 10.0
 LABEL_LEFT: Final = 24.0
+WORDS_LINE: Final = 14.0
+STUB_LINE: Final = 12.0
 
 
 class Kind(StrEnum):

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Final
 
 from firable.nets.drawing.arrangement import Arrangement
 from firable.nets.drawing.colours import colours
@@ -26,6 +25,8 @@ from firable.nets.drawing.shapes import (
     BAR_HALF_WIDTH,
     LABEL_LEFT,
     RADIUS,
+    STUB_LINE,
+    WORDS_LINE,
     Bar,
     Edge,
     Kind,
@@ -39,8 +40,6 @@ from firable.nets.drawing.text import COMMAND
 from firable.nets.drawing.wrapping import Panel, wrapped_panels
 from firable.nets.drawing.xml import esc, head, ident, px
 from firable.nets.net import Marking, Net
-
-_LINE: Final = 14.0
 
 
 def draw_net(
@@ -201,11 +200,11 @@ class _Writer:
             )
         lines = bar.words
         if bar.in_margin:
-            x, y = 24.0, bar.y - (len(lines) - 1) * _LINE / 2 + 4
+            x, y = 24.0, bar.y - (len(lines) - 1) * WORDS_LINE / 2 + 4
         else:
             x, y = bar.segments[-1][1] + 8, bar.y + 4.5
         for k, (text, style) in enumerate(lines):
-            yield f'<text class="{style.css}" x="{px(x)}" y="{px(y + k * _LINE)}">{esc(text)}</text>'
+            yield f'<text class="{style.css}" x="{px(x)}" y="{px(y + k * WORDS_LINE)}">{esc(text)}</text>'
         if steps:
             shown = ", ".join(map(str, steps[:4])) + (", …" if len(steps) > 4 else "")
             yield (
@@ -216,7 +215,7 @@ class _Writer:
     def _stub(self, stub: Stub) -> Iterator[str]:
         y = self.where.bars[stub.transition].y - BAR_HALF_HEIGHT - 4
         x = stub.x + BAR_HALF_WIDTH - 7 - 9 * (stub.slot % 4)  # each its own end: one may be a dot, the other a circle
-        far_x, far_y = stub.x + BAR_HALF_WIDTH + 6, y - 7 - 12 * stub.slot
+        far_x, far_y = stub.x + BAR_HALF_WIDTH + 6, y - 7 - STUB_LINE * stub.slot
         not_wanted = () if stub.gate.wanted else ("0",)  # a signal may be wanted both 1 and 0
         yield f"<g {ident('gate', self.net.transitions[stub.transition].name, stub.gate.signal, *not_wanted)}>"
         yield f'<path class="stub" d="M{px(far_x)} {px(far_y)}L{px(x)} {px(y)}"/>'
@@ -235,9 +234,9 @@ class _Writer:
             yield f'<circle class="macro" cx="{px(spot.x)}" cy="{px(spot.y)}" r="{px(RADIUS - 4)}"/>'
         if place.name in self.marked:
             yield f'<circle class="token" cx="{px(spot.x)}" cy="{px(spot.y)}" r="5.5"/>'
-        y = spot.y - (len(lines) - 1) * _LINE / 2 + 4.5
+        y = spot.y - (len(lines) - 1) * WORDS_LINE / 2 + 4.5
         for k, (text, style) in enumerate(lines):
-            x, line_y = spot.x + LABEL_LEFT, y + k * _LINE
+            x, line_y = spot.x + LABEL_LEFT, y + k * WORDS_LINE
             if style is COMMAND:
                 yield from _send(spot, line_y - 3.5)
                 x += 12

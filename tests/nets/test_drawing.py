@@ -12,7 +12,7 @@ from firable.nets.catalogue import catalogue_names, catalogue_net
 from firable.nets.drawing import draw_net
 from firable.nets.drawing.layout import layout
 from firable.nets.drawing.rows import lane_order, rows_of
-from firable.nets.drawing.shapes import LABEL_LEFT, RADIUS
+from firable.nets.drawing.shapes import LABEL_LEFT, RADIUS, STUB_LINE, WORDS_LINE
 from firable.nets.net import Command, Controller, ExternalGate, Net, Place, Signal, Transition
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -179,3 +179,24 @@ def test_what_is_of_the_net_is_found_by_an_id_of_its_own(net: Net) -> None:
     assert wanted == {one for one in ids if not one.startswith("lane:")}
     owners = {place.owner for place in net.places} | {signal.owner for signal in net.signals}
     assert {f"lane:{quote(owner)}" for owner in owners if owner} == {one for one in ids if one.startswith("lane:")}
+
+
+def test_the_words_of_a_place_do_not_touch_the_signals_of_the_bar_below() -> None:
+    described = Place("c.p", "c", description="what stands here takes two lines beside its place")
+    signals = tuple(Signal(f"c.s{i}", "c") for i in range(4))
+    gates = tuple(ExternalGate(signal.name) for signal in signals)
+    net = Net(
+        "close",
+        (described, Place("c.q", "c", marked=True)),
+        (Transition("t", ("c.q",), ("c.p",)), Transition("u", ("c.p",), ("c.q",), external=gates)),
+        signals,
+        (Controller("c"),),
+    )
+    where = layout(net)
+    place, bar = where.places[0], where.bars[1]
+    assert len(place.words) == 3
+    assert {stub.x for stub in where.stubs} == {place.x}
+    below_words = place.y + WORDS_LINE * (len(place.words) - 1) / 2 + 7.5
+    above_signals = [bar.y - 20 - STUB_LINE * stub.slot for stub in where.stubs]
+    assert len(above_signals) == 4
+    assert below_words < min(above_signals)
