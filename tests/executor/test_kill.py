@@ -264,8 +264,8 @@ def test_log_of_a_cell_that_is_shorter_than_its_journal_says_is_refused_and_one_
 def test_log_of_a_cell_of_another_format_is_refused_by_it(tmp_path: Path) -> None:
     run_here(tmp_path, seconds=5.0)
     log = tmp_path / "cell.journal.cell"
-    log.write_text(log.read_text("utf-8").replace('"firable_cell": 2', '"firable_cell": 1'), "utf-8")
-    assert "it has format 1, and this firable writes 2" in refused(tmp_path)[1]
+    log.write_text(log.read_text("utf-8").replace('"firable_cell": 3', '"firable_cell": 2'), "utf-8")
+    assert "it has format 2, and this firable writes 3" in refused(tmp_path)[1]
 
 
 def test_file_that_is_no_log_of_a_cell_stays_as_it_is(tmp_path: Path) -> None:
