@@ -200,14 +200,24 @@ def _witness(net: Net, name: str, witness: Witness, told: dict[tuple[object, ...
         yield "already in the initial marking:"
     if witness.note:
         yield witness.note
-    if witness.marking:
-        yield f"then hold a token: {', '.join(witness.marking)}"
+    at_rest = _machines_at_rest(net)
+    if said := [name for name in witness.marking if name not in at_rest]:
+        yield f"then hold a token: {', '.join(said)}"
     if witness.waits:
         yield "in a circle, each waiting for the next:"
         yield from (f"  {line}" for line in waits_told(net, witness.waits))
     if witness.cycle:
         yield "and then for ever again:"
         yield from (f"  {line}" for line in told_steps(net, witness.cycle, len(witness.firings) + 1))
+
+
+def _machines_at_rest(net: Net) -> frozenset[str]:
+    """Of a cell with its machines, the places that say what was so from the beginning: that one is idle, or empty."""
+    from firable.nets.machines.laws import ACCIDENT, PLANT
+
+    if ACCIDENT not in net.place_index:
+        return frozenset()
+    return frozenset(place.name for place in net.places if place.owner == PLANT and place.marked)
 
 
 def told_steps(net: Net, firings: Sequence[Sequence[str]], first: int = 1) -> Iterator[str]:

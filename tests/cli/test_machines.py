@@ -223,6 +223,9 @@ def test_prove_shows_the_run_in_which_a_machine_closes_a_gate_after_the_vote(
     ):
         assert re.search(rf"mc\.part_present/{move} +{words}", told)
     assert "'t2-82' had voted yes, and the last firing makes 'mc.part_present' 0" in told
+    (held,) = (line for line in told.splitlines() if line.startswith("      then hold a token: "))
+    assert "plant.mc_table.raw" in held
+    assert "plant.CV1.idle" not in held, "machines that are as they were are left out"
     assert "hint: [F4002] put the interlock into the machine's own controller" in told
     assert main(["prove", CELL, "--machines", str(path), "--format", "json"]) == 1
     data = json.loads(capsys.readouterr().out)
