@@ -14,6 +14,7 @@ from functools import cache
 
 import pytest
 from support import inspected_cell
+from support.following import followed
 from support.stale_cells import carried, stopped
 from support.together_cell import together
 
@@ -29,10 +30,9 @@ from firable.nets.machines.closing import close
 from firable.nets.machines.loop import ClosedLoop, Faults, Sending
 from firable.nets.machines.plant_file import PlantModel, parse_plant
 from firable.nets.machines.telling import Telling
-from firable.nets.net import Marking, Net
+from firable.nets.net import Net
 from firable.nets.text import parse_net
 from firable.nets.verdict import Status
-from firable.semantics.player import Player
 from firable.semantics.trace import Fired, SignalChanged, Trace, parse_trace
 
 CELLS = ["one_robot", "one_robot_mc_late", "one_robot_mc_late_capacity", "two_robots_shared", "two_robots_separate"]
@@ -53,62 +53,8 @@ def run_of(net: Net, plant: PlantModel, workpieces: int, *disturbances: Disturba
     return report.state, parse_trace(stream.getvalue())
 
 
-class Follower:
-    """The markings that the loop can be in after what was seen of a run."""
-
-    def __init__(self, loop: ClosedLoop) -> None:
-        self.loop, self.net, self.player = loop, loop.net, Player(loop.net)
-        own = {name for some in loop.variants.values() for name in some}
-        self.moves = {t for t, transition in enumerate(self.net.transitions) if transition.name not in own}
-        self.variants = {name: {self.net.transition_index[one] for one in some} for name, some in loop.variants.items()}
-        self.next: dict[Marking, tuple[tuple[int, Marking], ...]] = {}
-        self.markings = self.moved({self.net.initial_marking})
-
-    def following(self, marking: Marking) -> tuple[tuple[int, Marking], ...]:
-        """What may fire in a marking without an accident, and what it leads to."""
-        if marking not in self.next:
-            calm = [t for t in self.player.firable(marking) if self.net.transitions[t].name not in self.loop.accidents]
-            self.next[marking] = tuple((t, self.player.fire(marking, [t])) for t in calm)
-        return self.next[marking]
-
-    def after(self, markings: set[Marking], transitions: set[int]) -> set[Marking]:
-        return {then for marking in markings for t, then in self.following(marking) if t in transitions}
-
-    def moved(self, markings: set[Marking]) -> set[Marking]:
-        """What the machines can make of some markings by themselves, these among them."""
-        found, new = set(markings), set(markings)
-        while new:
-            new = self.after(new, self.moves) - found
-            found |= new
-        return found
-
-    def fire(self, name: str) -> None:
-        self.markings = self.moved(self.after(self.markings, self.variants[name]))
-        assert self.markings, f"the loop cannot fire {name} here"
-
-    def sees(self, signal: str, *, value: bool) -> None:
-        """Leave out the markings in which a signal has not come to show a value: it did, some moment ago."""
-        place, means = self.loop.shown[signal]
-        bit = 1 << self.net.place_index[place]
-        self.markings = {marking for marking in self.markings if (bool(marking & bit) == means) == value}
-        assert self.markings, f"the loop does not show {signal} = {int(value)} here"
-        self.markings = self.moved(self.markings)
-
-
 def follow(cell: str, trace: Trace, sending: Sending = Sending.AT_ONCE, faults: Faults = Faults.NONE) -> int:
     return followed(loop_of(cell, sending, faults), trace)
-
-
-def followed(loop: ClosedLoop, trace: Trace) -> int:
-    follower, fired = Follower(loop), 0
-    for event in trace.events:
-        if isinstance(event, Fired):
-            for name in event.transitions:
-                follower.fire(name)
-                fired += 1
-        elif isinstance(event, SignalChanged) and event.value:
-            follower.sees(event.signal, value=True)
-    return fired
 
 
 @pytest.mark.parametrize("sending", Sending)
