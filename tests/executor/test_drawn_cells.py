@@ -124,10 +124,11 @@ def _first_wrong(cell: DrawnCell, course: Course, seen: Run) -> str | None:
     for event in seen.events:
         if isinstance(event, Noted) and event.note == "fault":
             break
-        if seen.accident and course.follower.can_go_wrong(course.markings):
+        if (seen.accident or seen.report is None) and course.follower.can_go_wrong(course.markings):
             at_risk = event.at_seconds
         if not course.goes_on(event):
-            # What is done beside an accident, in its instant, is in no run of the loop, where nothing fires behind it.
+            # What is done beside an accident, in its instant, is in no run of the loop, where nothing fires behind it;
+            # and a run can be cut off there, before it is told of the accident.
             return None if at_risk == event.at_seconds == end else f"{event} is not in the loop"
     if seen.accident and at_risk != end and not course.follower.can_go_wrong(course.markings):
         return f"no accident of the loop: {seen.accident}"
