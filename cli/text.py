@@ -213,7 +213,7 @@ def _witness(net: Net, name: str, witness: Witness, told: dict[tuple[object, ...
 
 def _machines_at_rest(net: Net) -> frozenset[str]:
     """Of a cell with its machines, the places that say what was so from the beginning: that one is idle, or empty."""
-    from firable.nets.machines.laws import ACCIDENT, PLANT
+    from firable.nets.machines.loop import ACCIDENT, PLANT
 
     if ACCIDENT not in net.place_index:
         return frozenset()

@@ -21,8 +21,7 @@ from firable.analysis.question import listed
 from firable.analysis.report import CheckReport
 from firable.analysis.spaces.reachability import Budget
 from firable.nets.formula import And, Constant, Firable, Formula, Holds, Not, Or, Start
-from firable.nets.machines.laws import ACCIDENT, OVERRUN
-from firable.nets.machines.loop import ClosedLoop
+from firable.nets.machines.loop import ACCIDENT, OVERRUN, ClosedLoop
 from firable.nets.net import Net, Property, PropertyKind, TemporalProperty
 from firable.nets.temporal import Fires, TemporalOr
 from firable.nets.verdict import Status, Verdict, Weight, Witness

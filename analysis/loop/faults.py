@@ -23,8 +23,7 @@ from firable.analysis.question import listed
 from firable.analysis.spaces.reachability import Budget
 from firable.nets.formula import Formula, Holds, Not, Or
 from firable.nets.machines.closing import close
-from firable.nets.machines.laws import ACCIDENT, OVERRUN
-from firable.nets.machines.loop import ClosedLoop, Faults
+from firable.nets.machines.loop import ACCIDENT, OVERRUN, ClosedLoop, Faults
 from firable.nets.machines.plant_file import PlantModel
 from firable.nets.net import Property
 from firable.nets.verdict import Status, Verdict, Weight

@@ -42,8 +42,7 @@ from firable.analysis.temporal.queries import temporal_question
 from firable.analysis.verdicts.properties import statement
 from firable.nets.formula import And, Deadlock, Formula, Holds, Not, format_formula
 from firable.nets.machines.closing import close
-from firable.nets.machines.laws import ACCIDENT, OVERRUN
-from firable.nets.machines.loop import ClosedLoop
+from firable.nets.machines.loop import ACCIDENT, OVERRUN, ClosedLoop
 from firable.nets.machines.plant_file import PlantModel
 from firable.nets.net import Net, Property, PropertyKind, TemporalProperty
 from firable.nets.verdict import Status, Verdict, Weight, overall

@@ -20,7 +20,7 @@ from firable.cli.page.markup import Markup, tag, together
 from firable.nets.decomposition import Decomposition
 from firable.nets.drawing import Frame
 from firable.nets.drawing.labels import local_name
-from firable.nets.machines.laws import PLANT, UNSENT
+from firable.nets.machines.loop import PLANT, UNSENT
 from firable.nets.net import Marking, Net, Place
 from firable.nets.verdict import Witness
 from firable.semantics.frames import frames

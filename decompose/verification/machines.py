@@ -31,8 +31,7 @@ from firable.decompose.verification.solvers import Answers
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import And, Constant, Firable, Formula, Holds, Not, Or
 from firable.nets.machines.closing import close
-from firable.nets.machines.laws import ACCIDENT, OVERRUN
-from firable.nets.machines.loop import ClosedLoop, Faults, Sending
+from firable.nets.machines.loop import ACCIDENT, OVERRUN, ClosedLoop, Faults, Sending
 from firable.nets.machines.plant_file import PlantModel, parse_plant
 from firable.nets.net import ExternalGate, Net, Property, PropertyKind, SignalKind
 from firable.nets.verdict import Status, Verdict

@@ -22,8 +22,8 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from firable.nets.machines.closing import close
-from firable.nets.machines.laws import PLANT, Laws
-from firable.nets.machines.loop import Sending
+from firable.nets.machines.laws import Laws
+from firable.nets.machines.loop import PLANT, Sending
 from firable.nets.machines.plant_file import Carry, PlantModel, Put
 from firable.nets.net import Marking, Net
 

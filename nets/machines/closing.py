@@ -37,8 +37,8 @@ from types import MappingProxyType
 from typing import Final
 
 from firable.nets.diagnostics import Diagnostic, InputError
-from firable.nets.machines.laws import ACCIDENT, OVERRUN, PLANT, UNSENT, Laws, fact
-from firable.nets.machines.loop import ClosedLoop, Faults, Sending
+from firable.nets.machines.laws import Laws, fact
+from firable.nets.machines.loop import ACCIDENT, OVERRUN, PLANT, UNSENT, ClosedLoop, Faults, Sending
 from firable.nets.machines.moment import NOTHING, Case, Literal, Moment, each
 from firable.nets.machines.plant_file import Failure, PlantModel, Stop, misfits
 from firable.nets.machines.telling import Telling

@@ -23,6 +23,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
+from firable.nets.machines.loop import ACCIDENT, OVERRUN, PLANT
 from firable.nets.machines.moment import Case, Literal
 from firable.nets.machines.plant_file import (
     Action,
@@ -40,11 +41,6 @@ from firable.nets.machines.plant_file import (
 )
 from firable.nets.net import Command, Net, Place
 
-PLANT = "plant"
-"""The owner of what stands for machines and workpieces."""
-UNSENT = f"{PLANT}.unsent"
-ACCIDENT = f"{PLANT}.accident"
-OVERRUN = f"{PLANT}.overrun"
 _RAW, _MACHINED = "raw", "machined"
 
 

@@ -8,9 +8,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Final
 
 from firable.nets.machines.moment import Literal
 from firable.nets.net import Net
+
+PLANT: Final = "plant"
+"""The owner of what stands for machines and workpieces."""
+UNSENT: Final = f"{PLANT}.unsent"
+ACCIDENT: Final = f"{PLANT}.accident"
+OVERRUN: Final = f"{PLANT}.overrun"
 
 
 class Sending(StrEnum):

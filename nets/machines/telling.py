@@ -26,7 +26,8 @@ from functools import cached_property
 from itertools import chain
 from typing import Final
 
-from firable.nets.machines.laws import PLANT, Laws, fact
+from firable.nets.machines.laws import Laws, fact
+from firable.nets.machines.loop import PLANT
 from firable.nets.machines.moment import Case, Literal, Moment, each
 from firable.nets.machines.plant_file import Carry, Grasp, Process, Put
 from firable.nets.net import Place, SignalKind

@@ -14,8 +14,7 @@ from firable.decompose.proofs.held_gates import COMMANDS, COMPLETIONS, held_gate
 from firable.decompose.splitting.cut import split
 from firable.nets.catalogue import catalogue_net, catalogue_path, catalogue_plant
 from firable.nets.machines.closing import close
-from firable.nets.machines.laws import ACCIDENT
-from firable.nets.machines.loop import Sending
+from firable.nets.machines.loop import ACCIDENT, Sending
 from firable.nets.machines.plant_file import PlantModel, parse_plant
 from firable.nets.text import parse_net
 from firable.nets.verdict import Status

@@ -19,8 +19,8 @@ from firable.executor.cell.plant import _Finish as Finish
 from firable.nets.catalogue import catalogue_names, catalogue_net, catalogue_path, catalogue_plant
 from firable.nets.diagnostics import InputError
 from firable.nets.machines.closing import close
-from firable.nets.machines.laws import ACCIDENT, OVERRUN, Laws
-from firable.nets.machines.loop import ClosedLoop, Faults, Sending
+from firable.nets.machines.laws import Laws
+from firable.nets.machines.loop import ACCIDENT, OVERRUN, ClosedLoop, Faults, Sending
 from firable.nets.machines.moment import NOTHING, Case, each
 from firable.nets.machines.plant_file import PlantModel, parse_plant
 from firable.nets.net import Command, Controller, Net, Place, Signal, SignalKind, Transition
