@@ -102,6 +102,7 @@ class Monitor:
         self.net = net
         self.loop = WatchedLoop(net, model, elsewhere)
         self.signals = self.loop.signals
+        self.completions = {place.completion for place in net.places if place.completion is not None}
         self.latency_seconds = latency_seconds
         self.is_held: Callable[[str], bool] = lambda _: False
         """Whether a promise keeps a signal as it was; until it ends no change of it is taken."""
@@ -160,16 +161,17 @@ class Monitor:
             return None
         s = self.signals.index(name)
         self.taken[s] = value
-        if not value and any(place.completion == name for place in self.net.places):
+        if not value and name in self.completions:
             # The command that clears it follows; until then the bit differs from what was taken, and not for long.
             self.belief = {m: _changed_at(since, (s,), at_seconds) for m, since in self.belief.items()}
             return None
         bit, means = self.loop.shown[s]
         believed = self._closed(self.belief, at_seconds)
+        may_be_late = name not in self.completions  # what a command has cleared is told of no more
         explained = {
             m: since
             for m, since in believed.items()
-            if (bool(m & bit) == means) == value or self._has_been(since[s], name, at_seconds)
+            if (bool(m & bit) == means) == value or (may_be_late and self._has_been(since[s], name, at_seconds))
         }
         self.taken_seconds[name] = at_seconds
         message = f"'{name}' became {int(value)}, and nothing that the machines can have done explains it"

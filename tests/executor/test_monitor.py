@@ -183,6 +183,45 @@ def test_a_signal_that_has_changed_again_may_be_taken_late_and_once(late_seconds
         assert again.subject == "robot.holds"
 
 
+def test_a_completion_that_its_command_has_cleared_is_not_taken_late() -> None:
+    """The belt waits for the full station, so it cannot be done, and what it had done before is over."""
+    net = parse_net("""\
+firable: 1
+cell: twice
+controllers:
+  belt:
+    start: rest
+    places:
+      rest:
+      one: {send: {machine: B, command: RUN}, until: there}
+      two: {send: {machine: B, command: RUN}, until: there}
+transitions:
+  go:   {from: belt.rest, to: belt.one}
+  next: {from: belt.one, to: belt.two}
+  back: {from: belt.two, to: belt.rest}
+""")
+    plant = parse_plant("""\
+firable_plant: 1
+plant: twice
+stations: [entry, table, exit]
+arrivals:   {station: entry, every_s: 1}
+departures: {station: exit, after_s: 1}
+machines: {B: {commands: {RUN: {does: carry, from: entry, to: table, takes_s: 4, when_full: wait}}}}
+sensors: {}
+""")
+    monitor = Monitor(net, plant)
+    for at, fired, sent in ((0.0, "go", "belt.one"), (4.1, "next", "belt.two")):
+        assert monitor.fired(at, fired) is None
+        if fired == "next":
+            assert monitor.signal(at, "belt.there", value=False) is None
+        assert monitor.sent(at, sent) is None
+        if fired == "go":
+            assert monitor.signal(4.0, "belt.there", value=True) is None
+    found = monitor.signal(4.3, "belt.there", value=True)
+    assert found is not None
+    assert found.subject == "belt.there"
+
+
 @pytest.mark.parametrize(("after_seconds", "patience"), [(0.0, 0.9), (3.0, 3.9)])
 def test_a_camera_that_never_judges_is_told_of_when_it_should_have(after_seconds: float, patience: float) -> None:
     before, shows = until_judged(1)
