@@ -184,10 +184,10 @@ def _note(loop: ClosedLoop, family: Family, about: str, witness: Witness) -> str
     ends = loop.accidents.get(last) or ": ".join(
         filter(None, (family.note.format(about), waiting(loop, witness.marking)))
     )
-    return "; ".join(filter(None, (ends, *stale(loop, witness))))
+    return "; ".join(filter(None, (ends, *_stale(loop, witness))))
 
 
-def stale(loop: ClosedLoop, witness: Witness) -> Iterator[str]:
+def _stale(loop: ClosedLoop, witness: Witness) -> Iterator[str]:
     """What fires in a run of the loop on a signal that has changed before the controller was told, as sentences."""
     player, marking = Player(loop.net), loop.net.initial_marking
     own = {variant: loop.cell.transition(name) for name, variants in loop.variants.items() for variant in variants}

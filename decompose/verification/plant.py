@@ -282,13 +282,17 @@ class Things:
         late |= {signal for signal in alone for value in (True, False) if self.told_late([(signal, value)])}
         return tuple(signal.name for signal in self.net.signals if signal.name in late)
 
+    @cached_property
+    def read(self) -> set[tuple[str, bool]]:
+        """The signals that some gate reads, each with the value that it wants."""
+        return {(gate.signal, gate.wanted) for t in self.net.transitions for gate in t.external}
+
     def told_late(self, changes: Collection[tuple[str, bool]]) -> set[str]:
         """Of signals that change to these values: where a gate may be open by one's old value; then the completion,
         too, which is told when nothing is news of what sensors show. None where no sensor is among them."""
-        read = {(gate.signal, gate.wanted) for t in self.net.transitions for gate in t.external}
         if all(signal in self.completions for signal, _ in changes):
             return set()
-        late = {signal for signal, value in changes if (signal, not value) in read}
+        late = {signal for signal, value in changes if (signal, not value) in self.read}
         return late | {signal for signal, _ in changes if late and signal in self.completions}
 
     def changing_together(self) -> Iterator[list[tuple[str, bool]]]:
