@@ -21,8 +21,8 @@ A connection alone says nothing of a device that has a sign of life (`alive`): a
 whose program stands still, shows what was so once. What is read is held back until that sign has changed on this very
 connection, and nothing is commanded; the last value of an earlier one proves nothing, as it may have changed before the
 device died. Two things do not wait: heartbeats, from which many a device makes its sign of life, and the safe outputs
-with which a run begins, or a connection that is latched. These are written at once, for the device may be alive, and
-once more when it is seen to be, for it may not have been.
+with which a run begins or ends, or a connection that is latched. These are written at once, for the device may be
+alive, and once more when it is seen to be, for it may not have been: until then those of the end are not confirmed.
 
 An error that is no failure of a link is a mistake, in a library or in what is served here. It ends the run, and this
 device is stopped as any other: over a new connection of which nothing is taken, since what it shows may be what nobody
@@ -384,7 +384,7 @@ class Kept:
                 if timer is not None:
                     timer.cancel()
         if self.safe:
-            await connection.write(self.safe)
+            await self._write_last(connection)
         self.is_safe = True
         if self.safe and (late_s := self.late_seconds - loop.time()) > 0:
             await asyncio.sleep(late_s)
@@ -397,6 +397,16 @@ class Kept:
             if self.safe:
                 await connection.write(self.safe)
             self.started |= was_alive
+
+    async def _write_last(self, connection: Connection) -> None:
+        """Write the safe outputs of the stop, once more when a device that has not been seen to be alive is."""
+        was_alive = self.is_alive
+        await connection.write(self.safe)
+        if not was_alive:
+            while not self.is_alive:
+                self.awake.clear()
+                await self.awake.wait()
+            await connection.write(self.safe)
 
     async def _get_ready(self, connection: Connection) -> None:
         """Let the device be commanded, which has shown what it shows, and that it is alive."""

@@ -105,7 +105,11 @@ def test_the_time_of_grace_runs_on_over_connections_without_a_sign_of_life_and_i
 
     heard = watched(test).heard
     assert heard.signals == [("guard", True, None), ("guard", False, None)]
-    assert heard.notes == ["D: connected", "D: not connected: silent: 'life' has not changed within 0.4 s"]
+    assert heard.notes == [
+        "D: connected",
+        "D: not connected: silent: 'life' has not changed within 0.4 s",
+        "D: has not confirmed its safe outputs: they are left to its watchdog",
+    ]
 
 
 def test_a_sign_of_life_that_has_changed_between_two_connections_proves_nothing_of_the_later_one() -> None:
@@ -172,6 +176,29 @@ def test_a_stop_drives_the_safe_outputs_of_a_device_that_has_not_been_seen_to_be
         assert not w.device.is_ready.is_set()
 
     watched(test)
+
+
+def test_the_safe_outputs_of_a_stop_are_not_confirmed_by_who_takes_them_for_a_dead_device() -> None:
+    """A broker, or the server of a control whose program stands still: the machines may be moving."""
+    w = watched(Watched.gone)
+    assert w.written[-1] == "output"
+    assert w.driver.unconfirmed == ("D",)
+    assert w.heard.notes[-1] == "D: has not confirmed its safe outputs: they are left to its watchdog"
+
+
+def test_the_safe_outputs_of_a_stop_come_once_more_when_the_device_is_seen_to_be_alive() -> None:
+    async def test(w: Watched) -> None:
+        await w.gone()
+        await until(lambda: w.device.kept.is_connected, "another connection")
+        w.driver.stop()
+        await asyncio.sleep(0.1)
+        assert w.driver.unconfirmed == ("D",)
+        w.written.clear()
+        w.lives()
+        await asyncio.sleep(0.1)
+        assert w.written == ["output"]
+
+    assert watched(test).driver.unconfirmed == ()
 
 
 def test_a_device_that_is_never_seen_to_be_alive_is_lost_when_its_start_is_over() -> None:
