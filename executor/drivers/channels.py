@@ -9,9 +9,11 @@ received is certain only when whatever may be on its way has had its time; shoul
 the number that the device has by then, and ignored.
 
 Where the device already shows the number that is to be sent, as it may when a run begins without a journal, it is sent
-number 0 first, "no command", and the number goes out when it is shown no more. Rejected, where a device has the choice:
-bits for request and done, with their four edges for each command. They know no order, and say little after a restart;
-a device that has nothing else is spoken to by `handshake.py`.
+number 0 first, "no command", and the number goes out when it is shown no more. So it is where a command was given up
+that the device has not taken: the next one, such as a stop, does not wait for a program that stands still, and what it
+writes is never taken with the number of the one before. Rejected, where a device has the choice: bits for request and
+done, with their four edges for each command. They know no order, and say little after a restart; a device that has
+nothing else is spoken to by `handshake.py`.
 
 The device *has* a command when it shows its number. Of a channel that shows nothing of what it has taken, the
 confirmation of the write must do; behind a broker that is the broker's word alone. What it has is not written again: a
@@ -95,6 +97,8 @@ class Channel:
         """Whether the newest order is not to be written again, should its connection fail before the device has it."""
         self.failed_before: int | None = None
         """The number that was shown as failed when a restart asked, as long as it is: somebody was asked what to do."""
+        self.is_left_standing = False
+        """Whether a command that was given up may stand at the device, which would still take it."""
         self.not_received: set[int] = set()
         """The numbers of which a restart was told that the device had not received them."""
 
@@ -144,13 +148,15 @@ class Channel:
     def next_writes(self) -> Writes | None:
         """What is to be written now, if anything; `written` follows when the device has it."""
         if self._delivered() and self.waiting:
+            self.is_left_standing |= self._is_given_up
             self.current, self.phase, self.is_taken = self.waiting.popleft(), _Phase.HELD, False
             self.is_withdrawn = False
         order = self.current
         if order is None or self.phase in {_Phase.WRITING, _Phase.WRITTEN}:
             return None
-        if order.number in self.shown.values() and order.number not in self.not_received:
-            if self.phase is _Phase.CLEARING:
+        is_shown = order.number in self.shown.values() and order.number not in self.not_received
+        if is_shown or self.is_left_standing:
+            if self.phase is _Phase.CLEARING and not self.is_left_standing:
                 return None
             self.phase = _Phase.CLEARING
             return self._numbered(0, "")
@@ -162,6 +168,8 @@ class Channel:
 
     def written(self) -> tuple[Outcome, ...]:
         """The device has confirmed what was to be written; returns what that tells, where it does not tell more."""
+        if self.phase is _Phase.CLEARING:
+            self.is_left_standing = False
         if self.phase is not _Phase.WRITING or (order := self.current) is None:
             return ()
         self.phase = _Phase.WRITTEN
@@ -200,8 +208,8 @@ class Channel:
             return None
         if order.number in self.shown.values() and self.phase is not _Phase.CLEARING:
             self.phase = _Phase.WRITTEN
-        elif not self.is_taken and self.is_withdrawn:
-            self.current, self.phase = None, _Phase.WRITTEN
+        elif self._is_given_up:
+            self.current, self.phase, self.is_left_standing = None, _Phase.WRITTEN, True
         elif not self.is_taken:
             self.phase = _Phase.HELD
         else:
@@ -265,10 +273,15 @@ class Channel:
         return () if order is None else (Outcome(order, Said.TAKEN),)
 
     def _delivered(self) -> bool:
-        """Whether the next order may go out: the device has the newest, as far as it tells."""
+        """Whether the next order may go out: the device has the newest, as far as it tells, or is not to have it."""
         if self.current is None:
             return True
-        return self.phase is _Phase.WRITTEN and (self.is_taken or self.document.taken is None)
+        return self.phase is _Phase.WRITTEN and (self.is_taken or self.document.taken is None or self.is_withdrawn)
+
+    @property
+    def _is_given_up(self) -> bool:
+        """Whether the newest order was given up, and the device is not known to have it."""
+        return self.current is not None and self.is_withdrawn and not self.is_taken
 
     def _numbered(self, number: int, text: str) -> Writes:
         if self.document.number is not None:

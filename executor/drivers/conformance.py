@@ -164,6 +164,34 @@ class DriverConformance(StoppingConformance):
 
         self.bench(test, timeout_s=QUICK_S)
 
+    def test_a_command_does_not_wait_for_one_that_was_given_up_before_the_machine_took_it(self) -> None:
+        """A stop must not stand behind what it is to stop; nor is the other taken with what the stop writes."""
+
+        async def test(b: Bench, *, is_cut: bool) -> None:
+            async with b.connected():
+                b.machine.takes = False
+                b.driver.send(b.place("move"), 1)
+                await until(lambda: b.machine.waiting, "the command is written")
+                if is_cut:
+                    await b.far.end.cut()
+                    await until(lambda: not b.driver.devices["D"].is_ready.is_set(), "the loss")
+                b.driver.withdraw(b.place("move"))
+                b.driver.send(b.place("halt"), 1)
+                if is_cut:
+                    await b.far.end.mend()
+                moving = b.machine.waiting
+                await until(lambda: b.machine.waiting not in {moving, None}, "the other is written")
+                number = "number" if "number" in b.far.points else "command"
+                written = [role for role in b.machine.events if role in {"code", number}]
+                assert written == ["code", number, number, "code", number], "with number 0 between them"
+                b.machine.takes = True
+                await until(lambda: b.heard.takings, "it is taken")
+            assert b.heard.takings == [("M.halt", 1)]
+            assert len(b.machine.orders) == 1
+
+        self.bench(lambda b: test(b, is_cut=False))
+        self.bench(lambda b: test(b, is_cut=True), timeout_s=QUICK_S)
+
     def test_a_failed_command_is_a_fault(self) -> None:
         """A failure is told at once, and not when the command is overdue."""
 

@@ -141,7 +141,7 @@ class Machine:
 
     def _ordered(self, number: int | None, code: Value) -> None:
         if number == 0:
-            self.number = 0
+            self.number, self.waiting = 0, None
             for role in ("taken", "done", "failed"):
                 self.show(role, 0)
         elif number is not None and number != self.number and not self.taking:
