@@ -11,7 +11,7 @@ import click
 
 from firable.cli import text
 from firable.cli.files import READ, WRITTEN
-from firable.cli.loop import machines_option, plant_text
+from firable.cli.loop import machines_option, read_fitting
 from firable.cli.options import (
     analysis_options,
     answer,
@@ -136,21 +136,23 @@ def _report(
     from firable.analysis.deadline import Deadline
     from firable.analysis.goal import Limits
     from firable.decompose.bundling import SECONDS, UnbundledError, make_bundle
+    from firable.nets.blocked_timeouts import blocked_timeouts
     from firable.nets.bundle import write_bundle
     from firable.nets.verdict import Status, overall
 
     loaded = load_net(argument)
-    net, allowed = loaded.net, budget(**limits)
+    net, allowed, notes = loaded.net, budget(**limits), loaded.notes
     if machines is not None:
-        more["plant"] = plant_text(machines, net)
+        from firable.nets.machines.plant_file import late_limits
+
+        more["plant"], model = read_fitting(machines, net)
+        notes += late_limits(model, net)
     if made_of is not None:
         more["origin"] = _origin(*made_of, allowed)
     with loaded.placing():
         found = check(net, budget=allowed)
     figures = found.figures.to_json()
-    unmade = Report(
-        "bundle", argument, net, found.verdicts, figures=figures, notes=loaded.notes, positions=loaded.positions
-    )
+    unmade = Report("bundle", argument, net, found.verdicts, figures=figures, notes=notes, positions=loaded.positions)
     if overall(unmade.verdicts) is not Status.PROVED:
         return unmade
     seconds = SECONDS if allowed.seconds is None else allowed.seconds
@@ -166,6 +168,7 @@ def _report(
     write_bundle(output, made)
     return replace(
         unmade,
+        notes=(*notes, *loaded.placed(blocked_timeouts(made.decomposition))),
         verdicts=tuple(replace(told.get(one.name, one), evidence=one.evidence) for one in made.verdicts),
         figures={**figures, "bundle_digest": made.digest},
         table=made.decomposition.table,

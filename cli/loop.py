@@ -46,16 +46,17 @@ def read_machines(argument: str) -> PlantModel:
     return read_plant(file)
 
 
-def plant_text(argument: str, net: Net) -> str:
-    """The text of the plant file that an argument names, after it was read without a mistake and fits the net."""
+def read_fitting(argument: str, net: Net) -> tuple[str, PlantModel]:
+    """The plant that an argument names, with the text of its file, after it was found to fit the net."""
     from firable.nets.diagnostics import InputError
     from firable.nets.machines.plant_file import SIZE_BYTES_MAX, misfits, parse_plant
     from firable.nets.source import read_source
 
     source = read_source(_plant_file(argument), SIZE_BYTES_MAX)
-    if problems := misfits(parse_plant(source.text, source.file), net):
+    model = parse_plant(source.text, source.file)
+    if problems := misfits(model, net):
         raise InputError(problems)
-    return source.text
+    return source.text, model
 
 
 def _plant_file(argument: str) -> Path | str:

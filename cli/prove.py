@@ -96,10 +96,12 @@ def _report(
     from firable.decompose.proofs.standing import standing
     from firable.decompose.protocol.parametric.side_conditions import side_conditions
     from firable.decompose.splitting.cut import split
+    from firable.nets.blocked_timeouts import blocked_timeouts
 
     loaded = load_net(argument)
     with loaded.placing():
         decomposition = split(loaded.net)
+    notes = (*loaded.notes, *loaded.placed(blocked_timeouts(decomposition)))
     with stages() as begins:
         found = prove_split(decomposition, timeout_ms=max(1, round(timeout * 1000)), begins=begins)
     verdicts = (*found.verdicts, *side_conditions(decomposition))
@@ -107,8 +109,11 @@ def _report(
     if machines is not None:
         from firable.analysis.spaces.reachability import Budget
         from firable.decompose.proofs.held_gates import held_gates
+        from firable.nets.machines.plant_file import late_limits
 
-        held = held_gates(decomposition, read_machines(machines), Budget(seconds=timeout))
+        model = read_machines(machines)
+        held = held_gates(decomposition, model, Budget(seconds=timeout))
+        notes += late_limits(model, loaded.net)
         loop = held.loop
         verdicts += held.verdicts
         if smt_dir is not None:
@@ -126,7 +131,7 @@ def _report(
         argument,
         loaded.net,
         verdicts,
-        notes=loaded.notes,
+        notes=notes,
         table=decomposition.table,
         assumptions=tuple(map(str, assumptions(decomposition))),
         standing=tuple(standing(decomposition, verdicts)),

@@ -128,6 +128,7 @@ def _report(argument: str, asked: _Asked, output: str | None, subnet_dir: str | 
     from firable.analysis.goal import Limits
     from firable.decompose.splitting.cut import split as split_net
     from firable.decompose.splitting.persistence import persistence
+    from firable.nets.blocked_timeouts import blocked_timeouts
 
     loaded, rules = load_net(argument), _rules(asked)
     with loaded.placing():
@@ -145,7 +146,7 @@ def _report(argument: str, asked: _Asked, output: str | None, subnet_dir: str | 
         argument,
         net,
         found.verdicts,
-        notes=loaded.notes,
+        notes=(*loaded.notes, *loaded.placed(blocked_timeouts(decomposition))),
         table=decomposition.table,
         decomposition=replace(decomposition, free=found.free),
         files=files,

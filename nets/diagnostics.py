@@ -122,6 +122,7 @@ CODES: Final[dict[str, str]] = {
     "F4012": "a resource that a task takes twice, keeps or loses",
     "F4013": "a task that violates a condition of refinement",
     "F4014": "a place that cannot be opened to its task",
+    "F4015": "a timeout that waits for a decision",
     # F5: running
     "F5001": "the bundle is damaged or has been changed",
     "F5002": "the bundle is not proved",

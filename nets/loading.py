@@ -8,7 +8,7 @@ document that net files are checked by takes as long to load as a small net to c
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Iterable, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -45,9 +45,11 @@ class Loaded:
         try:
             yield
         except InputError as error:
-            if self.positions is None:
-                raise
-            raise InputError(self.positions.place(error.diagnostics)) from None
+            raise InputError(self.placed(error.diagnostics)) from None
+
+    def placed(self, diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+        """What was found with the net, with the positions in its file."""
+        return tuple(diagnostics if self.positions is None else self.positions.place(diagnostics))
 
 
 def load(path: str | Path) -> Loaded:

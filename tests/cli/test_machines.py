@@ -175,6 +175,55 @@ def test_a_bundle_that_the_machines_forbid_ends_with_a_report_of_what_is_violate
     assert not bundle.exists()
 
 
+WATCHED = """
+firable: 1
+cell: watched
+controllers:
+  robot:
+    start: home
+    inputs: reset
+    places:
+      home:
+      out:       {send: {machine: R, command: MOVE, to: OUT}, until: is_out, within: 1s}
+      out_fault: {send: {machine: R, command: STOP}}
+  camera: {start: idle, places: {idle: , seen: }}
+transitions:
+  start: {from: robot.home, to: robot.out}
+  again: {from: robot.out_fault, to: robot.out, if: robot.reset}
+  end:   {from: robot.out, to: robot.home}
+  see:   {from: camera.idle, to: camera.seen, if: robot.out}
+  rest:  {from: camera.seen, to: camera.idle}
+"""
+HASTY = """
+firable_plant: 1
+plant: watched
+stations: [table]
+arrivals:   {station: table, every_s: 5}
+departures: {station: table}
+machines:
+  R: {hand: OUT, positions: {OUT: }, commands: {MOVE: {does: move, takes_s: 1.5}, STOP: {does: stop}}}
+sensors: {robot.reset: {acknowledges: R, after_s: 3}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("command", "codes"), [("split", ["F4015"]), ("prove", ["F4015", "F5009"]), ("bundle", ["F4015", "F5009"])]
+)
+def test_limits_that_a_split_or_a_machine_makes_late_are_warned_of_where_they_stand(
+    command: str, codes: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    net, plant = tmp_path / "watched.firable.yaml", tmp_path / "watched.plant.yaml"
+    net.write_text(WATCHED)
+    plant.write_text(HASTY)
+    options = ["--machines", str(plant)] if "F5009" in codes else []
+    options += ["-o", str(tmp_path / "cell.bundle")] if command == "bundle" else []
+    main([command, str(net), *options])
+    told = capsys.readouterr().err
+    assert sorted(re.findall(r"warning\[(F\d+)\]", told)) == codes
+    line = 1 + WATCHED.splitlines().index("  see:   {from: camera.idle, to: camera.seen, if: robot.out}")
+    assert f"watched.firable.yaml:{line}:3: warning[F4015]: 'robot.out_timeout' waits" in told
+
+
 def test_a_bundle_for_whose_loops_the_time_is_too_short_says_how_to_give_more(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -29,6 +29,7 @@ from firable.executor.protocol.token_player import TokenPlayer
 from firable.executor.simulation.campaign import Passed, Run, rehearse
 from firable.executor.simulation.drawn import DRAWN
 from firable.executor.simulation.judge import Subject
+from firable.nets.blocked_timeouts import blocked_timeouts
 from firable.nets.catalogue import catalogue_net, catalogue_path, catalogue_plant
 from firable.nets.decomposition import Decomposition
 from firable.nets.machines.plant_file import parse_plant
@@ -141,6 +142,36 @@ def test_a_timer_that_a_promise_reads_is_set_when_the_promise_ends() -> None:
     assert controller.promises[0].promised == {"lit"}
     assert controller.tick(1.0) == []
     assert OVER in controller.receive(Decision("a", 0, "lit", 0, -1))
+
+
+@pytest.mark.parametrize(
+    ("gate", "waits"),
+    [
+        ("if: a.go", True),
+        ("unless: a.go_fault", True),
+        ("unless: a.go_overdue", True),
+        ("unless: a.go", False),
+        ("if: a.go_fault", False),
+        ("if: a.go_overdue", False),
+        ("unless: a.there", False),
+        ("unless: a.free", False),
+    ],
+)
+def test_a_timeout_that_a_promise_would_keep_from_firing_is_warned_of(gate: str, waits: bool) -> None:
+    text = HANDOVER.replace("{idle: , has: }", "{idle: , has: , lamp: }")
+    decomposition = split(parse_net(text.replace("  use:", f"  lit: {{from: b.idle, to: b.lamp, {gate}}}\n  use:")))
+    controller = LocalController(decomposition, "a")
+    controller.fire()
+    controller.tick(0.0)
+    controller.receive(VoteRequest("a", 0, ("lit",), 0, -1))
+    controller.tick(1.0)
+    assert (Firing("a.go_timeout") in controller.fire()) is not waits
+    warned = [one for one in blocked_timeouts(decomposition) if f"({gate})" in one.message]
+    assert [(one.code, one.subject) for one in warned] == ([("F4015", ("transitions", "lit"))] if waits else [])
+
+
+def test_a_timeout_waits_for_no_transition_that_takes_the_token_or_is_decided_by_its_controller_alone() -> None:
+    assert not [*blocked_timeouts(handover()), *blocked_timeouts(split(catalogue_net("one_robot_timed")))]
 
 
 def test_a_timer_that_a_promise_held_back_is_not_set_if_the_completion_has_come_meanwhile() -> None:
