@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -28,6 +28,8 @@ from firable.cli.report import Report
 if TYPE_CHECKING:
     from firable.analysis.spaces.reachability import Budget
     from firable.decompose.refinement.sealing import Origin
+    from firable.nets.diagnostics import Diagnostic
+    from firable.nets.net import Net
     from firable.nets.verdict import Verdict
 
 _UNMADE: Final = "F4003"
@@ -74,27 +76,38 @@ def bundle(
     """
     if output == "-":
         raise click.UsageError("a bundle cannot go to standard output, where the report goes: name a file")
-    more: dict[str, Any] = {"protocol": protocol, "faults": faults}
     if files and conceptual is None:
         raise click.UsageError("--tasks goes with --conceptual, whose places name tasks")
-    made_of = None if conceptual is None else (conceptual, files)
-    return answer(
-        "bundle", format_, with_page(lambda: _telling(net, output, limits, more, machines, made_of), page), _show
-    )
+    asked = _Asked(net, output, budget(**limits), machines, protocol, faults, conceptual, files)
+    return answer("bundle", format_, with_page(lambda: _telling(asked), page), _show)
 
 
-def _telling(argument: str, output: str, *more: Any) -> Report:
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What a bundle is to be made of, and what it is to hold."""
+
+    net: str
+    output: str
+    allowed: Budget
+    machines: str | None
+    protocol: bool
+    faults: bool
+    conceptual: str | None
+    tasks: tuple[str, ...]
+
+
+def _telling(asked: _Asked) -> Report:
     """The report, which where no bundle was made tells of what stands in its place: a script would go on with that."""
     from firable.nets.diagnostics import Diagnostic, InputError, Severity
 
     try:
-        report = _report(argument, output, *more)
+        report = _report(asked)
     except InputError as error:
-        if not (older := _older(output)):
+        if not (older := _older(asked.output)):
             raise
         *others, last = error.diagnostics
         raise InputError([*others, replace(last, hint="; ".join(filter(None, (last.hint, older))))]) from None
-    if report.files or not (older := _older(output)):
+    if report.files or not (older := _older(asked.output)):
         return report
     hint = "take it away, so that nothing goes on with it"
     return replace(report, notes=(*report.notes, Diagnostic(_UNMADE, older, hint, severity=Severity.WARNING)))
@@ -116,22 +129,28 @@ def _older(output: str) -> str:
     return f"{printable(output)} was not made by this call: it is {what}"
 
 
-def _origin(conceptual: str, files: tuple[str, ...], allowed: Budget) -> Origin:
+def _origin(asked: _Asked) -> Origin | None:
+    """The conceptual net that the net is made of, with the tasks that its places name."""
+    if asked.conceptual is None:
+        return None
     from firable.decompose.refinement.sealing import Origin
 
-    loaded = load_net(conceptual)
+    loaded = load_net(asked.conceptual)
     with loaded.placing():
-        return Origin.of(loaded.net, read_catalogue(files), allowed)
+        return Origin.of(loaded.net, read_catalogue(asked.tasks), asked.allowed)
 
 
-def _report(
-    argument: str,
-    output: str,
-    limits: dict[str, Any],
-    more: dict[str, Any],
-    machines: str | None,
-    made_of: tuple[str, tuple[str, ...]] | None,
-) -> Report:
+def _plant(asked: _Asked, net: Net) -> tuple[str, tuple[Diagnostic, ...]]:
+    """The text of the plant file, and what it warns of; nothing where none is named."""
+    if asked.machines is None:
+        return "", ()
+    from firable.nets.machines.plant_file import late_limits
+
+    text, model = read_fitting(asked.machines, net)
+    return text, late_limits(model, net)
+
+
+def _report(asked: _Asked) -> Report:
     from firable.analysis.check import check
     from firable.analysis.deadline import Deadline
     from firable.analysis.goal import Limits
@@ -140,52 +159,62 @@ def _report(
     from firable.nets.bundle import write_bundle
     from firable.nets.verdict import Status, overall
 
-    loaded = load_net(argument)
-    net, allowed, notes = loaded.net, budget(**limits), loaded.notes
-    if machines is not None:
-        from firable.nets.machines.plant_file import late_limits
-
-        more["plant"], model = read_fitting(machines, net)
-        notes += late_limits(model, net)
-    if made_of is not None:
-        more["origin"] = _origin(*made_of, allowed)
+    loaded, allowed = load_net(asked.net), asked.allowed
+    plant, late = _plant(asked, loaded.net)
+    origin = _origin(asked)
     with loaded.placing():
-        found = check(net, budget=allowed)
+        found = check(loaded.net, budget=allowed)
     figures = found.figures.to_json()
-    unmade = Report("bundle", argument, net, found.verdicts, figures=figures, notes=notes, positions=loaded.positions)
+    unmade = Report(
+        "bundle",
+        asked.net,
+        loaded.net,
+        found.verdicts,
+        figures=figures,
+        notes=(*loaded.notes, *late),
+        positions=loaded.positions,
+    )
     if overall(unmade.verdicts) is not Status.PROVED:
         return unmade
     seconds = SECONDS if allowed.seconds is None else allowed.seconds
     told = {verdict.name: verdict for verdict in found.verdicts}  # with all that the bundle has no evidence on
     with loaded.placing():
         try:
-            made = make_bundle(found, Limits(Deadline.after(seconds), allowed.memory_bytes), **more)
+            made = make_bundle(
+                found,
+                Limits(Deadline.after(seconds), allowed.memory_bytes),
+                protocol=asked.protocol,
+                faults=asked.faults,
+                plant=plant,
+                origin=origin,
+            )
         except UnbundledError as refusal:
-            verdicts = tuple(told.get(one.name) or _told(one, argument, machines) for one in refusal.verdicts)
+            verdicts = tuple(told.get(one.name) or _told(one, asked) for one in refusal.verdicts)
             if overall(verdicts) is Status.PROVED:  # what is lacking is evidence
                 raise
             return replace(unmade, verdicts=verdicts)
-    write_bundle(output, made)
+    write_bundle(asked.output, made)
     return replace(
         unmade,
-        notes=(*notes, *loaded.placed(blocked_timeouts(made.decomposition))),
+        notes=(*unmade.notes, *loaded.placed(blocked_timeouts(made.decomposition))),
         verdicts=tuple(replace(told.get(one.name, one), evidence=one.evidence) for one in made.verdicts),
         figures={**figures, "bundle_digest": made.digest},
         table=made.decomposition.table,
         decomposition=made.decomposition,
-        files=(output,),
+        files=(asked.output,),
     )
 
 
-def _told(verdict: Verdict, argument: str, machines: str | None) -> Verdict:
+def _told(verdict: Verdict, asked: _Asked) -> Verdict:
     """A verdict on one of the loops with machines, told without its run: it is of a net that is not shown here."""
     from firable.decompose.bundling import seen_by
     from firable.decompose.proofs.closed_loops import PREFIXES
 
     is_seen = verdict.witness is not None or verdict.status.value == "unknown"
-    if machines is None or not is_seen or not verdict.name.startswith(PREFIXES):
+    if asked.machines is None or not is_seen or not verdict.name.startswith(PREFIXES):
         return verdict
-    hint = "; ".join(filter(None, (verdict.hint, seen_by(verdict, shlex.quote(argument), shlex.quote(machines)))))
+    seen = seen_by(verdict, shlex.quote(asked.net), shlex.quote(asked.machines))
+    hint = "; ".join(filter(None, (verdict.hint, seen)))
     return replace(verdict, witness=None, hint=hint)
 
 
