@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from firable.executor.drivers.binding import Binding
     from firable.executor.drivers.bound import BoundDriver
-    from firable.executor.drivers.bound_device import Forcing
+    from firable.executor.drivers.bound_device import ByHand
     from firable.executor.drivers.driver import Reading
     from firable.nets.net import Place
 
@@ -60,7 +60,8 @@ def live_io(
     Only a serial line is one program's: this ends where another one has it, and nobody has it while this looks at it.
 
     --force and --send write, each only where the binding says `force: true` of the signal or of the command. What is
-    forced is written once, on the first connection; where the device does not take it, that is told at the end.
+    forced is written once, on the first connection; a command is sent where its device is connected, and given up when
+    that is lost. Where the device does not take it, that is told at the end.
 
     With --send this is the master of the devices: it gives them their heartbeats, and drives the safe outputs at both
     ends. An emergency stop ends it. Never do that beside a running cell.
@@ -69,8 +70,8 @@ def live_io(
     answer.
 
     Ctrl-C ends it, as does a request to terminate or the end of its terminal. Exit codes: 0, or 1 where a machine was
-    stopped or has failed at what was sent, or something was not forced; 2 for a binding that cannot be used or a serial
-    line that another program has; and 3 where --once cannot read something.
+    stopped or has failed at what was sent, or something was not forced or not taken; 2 for a binding that cannot be
+    used or a serial line that another program has; and 3 where --once cannot read something.
     """
     import asyncio
 
@@ -96,7 +97,7 @@ def live_io(
     code = 0
     with suppress(KeyboardInterrupt, asyncio.CancelledError):
         code = asyncio.run(ended())
-    return 1 if heard.tell_unforced() and not code else code
+    return 1 if heard.tell_undone() and not code else code
 
 
 def _forced(binding: Binding, text: str) -> tuple[str, bool]:
@@ -157,8 +158,8 @@ class _Heard:
         """Whether a machine has failed, or was stopped."""
         self.lines = 0
         """How many lines of the table stand above, to be written over."""
-        self.forcings: dict[str, Forcing] = {}
-        """What was to be forced, as it was asked for."""
+        self.by_hand: list[tuple[str, ByHand]] = []
+        """What was to be forced and sent, as it was asked for."""
         self.lines_taken: dict[str, str] = {}
         """The devices whose serial line another program has, and how that was told."""
         self.is_to_end = asyncio.Event()
@@ -203,12 +204,13 @@ class _Heard:
         """The driver has driven its safe outputs, and has ended."""
         self._told(f"{_ENDED}, and nothing is read any more")
 
-    def tell_unforced(self) -> bool:
-        """Tell at the end what was to be forced and was not; whether there is anything."""
-        unforced = {text: forcing for text, forcing in self.forcings.items() if not forcing.is_written}
-        for text, forcing in unforced.items():
-            self._told(f"{click.style('error', fg='red')}: --force {text} was not written: {forcing.refused}")
-        return bool(unforced)
+    def tell_undone(self) -> bool:
+        """Tell at the end what was to be forced or sent and was not; whether there is anything."""
+        undone = [(asked, one) for asked, one in self.by_hand if not one.is_done]
+        for asked, one in undone:
+            done = "taken" if asked.startswith("--send") else "written"
+            self._told(f"{click.style('error', fg='red')}: {asked} was not {done}: {one.refused}")
+        return bool(undone)
 
     def _told(self, line: str) -> None:
         self.lines = 0
@@ -286,10 +288,10 @@ async def _shown(
     running = asyncio.create_task(_served(driver, heard))
     try:
         for signal, value in forced:
-            heard.forcings[f"{signal}={value:d}"] = driver.force(signal, value)
+            heard.by_hand.append((f"--force {signal}={value:d}", driver.force(signal, value)))
         reached = await _connected(driver, running)
         for place in places:
-            driver.send(place, 0)
+            heard.by_hand.append((f"--send {place.name}", driver.send_by_hand(place)))
         while not running.done() and _is_writing(driver, heard):
             await asyncio.sleep(0.01)
         if once:
@@ -311,9 +313,15 @@ async def _shown(
 
 
 def _is_writing(driver: BoundDriver, heard: _Heard) -> bool:
-    """Whether a device that is there has not confirmed what it was to be written; no command is, where one failed."""
+    """Whether a device that is there has not confirmed what it was to be written; no command is, where one failed.
+
+    One that it has not taken by when it should have is awaited no more.
+    """
     there = [device for device in driver.devices.values() if device.is_ready.is_set()]
-    return any(device.forced or (device.is_writing and not heard.failed) for device in there)
+    return any(
+        device.forced or (not heard.failed and (device.is_writing or (device.sent and not device.untaken)))
+        for device in there
+    )
 
 
 async def _served(driver: BoundDriver, heard: _Heard) -> None:

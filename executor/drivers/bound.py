@@ -11,7 +11,7 @@ import asyncio
 from collections.abc import Collection, Mapping, Sequence
 
 from firable.executor.drivers.binding import Binding, CommandDocument
-from firable.executor.drivers.bound_device import LOOK_SECONDS, BoundDevice, Forcing
+from firable.executor.drivers.bound_device import LOOK_SECONDS, BoundDevice, ByHand
 from firable.executor.drivers.cancelling import ended, uninterrupted
 from firable.executor.drivers.completions import Completions
 from firable.executor.drivers.driver import Answer, Cautious, Clock, Listener, Reading
@@ -195,7 +195,12 @@ class BoundDriver:
             return Answer.UNKNOWN if stopped else Answer.WORKING
         return answer
 
-    def force(self, signal: str, value: bool) -> Forcing:
+    def send_by_hand(self, place: Place) -> ByHand:
+        """Send the command of a place to its device, as it is connected now, and never on a later connection."""
+        command = self._command(place.name)
+        return self.devices[command.device].send_by_hand(command, place)
+
+    def force(self, signal: str, value: bool) -> ByHand:
         """Write a signal on its device, once; raises `ValueError` where the binding does not allow it."""
         bound = self.binding.document.signals.get(signal)
         if bound is None or not bound.force:

@@ -38,14 +38,13 @@ _POINTS: Final = "are the points written as the device has them?"
 
 
 @dataclass(slots=True)
-class Forcing:
-    """A value that is written beside all else, once: on the connection that stands, or on the first that does."""
+class ByHand:
+    """What a person has written or sent, on one connection alone: nothing may move when a line is plugged in later."""
 
-    writes: Writes
-    is_written: bool = False
-    """Whether the device has confirmed it."""
+    is_done: bool = False
+    """Whether the device has confirmed the value, or shown that it has the command."""
     refused: str = ""
-    """Why it will not be: what ended the connection before the device had confirmed it, or that there is none."""
+    """Why it will not be: what ended the connection before that, or that there is none."""
 
 
 class BoundDevice:
@@ -80,8 +79,10 @@ class BoundDevice:
         heartbeat, alive = self.document.heartbeat, self.document.alive
         self.tripped = None if heartbeat is None else heartbeat.tripped
         self.has_tripped: bool | None = None
-        self.forced: deque[Forcing] = deque()
-        """What is to be written beside all else."""
+        self.forced: deque[tuple[Writes, ByHand]] = deque()
+        """What is to be written beside all else, on the connection that stands or on the first that does."""
+        self.sent: list[tuple[str, ByHand]] = []
+        """The places whose commands a person has sent, as long as it has not shown that it has them."""
         self.writing: Channel | Handshake | None = None
         self.is_ready = asyncio.Event()
         self.was_ready = False
@@ -130,7 +131,7 @@ class BoundDevice:
             for alarm in (self.alarm, self.due, begun, *self.patience.values()):
                 if alarm is not None:
                     alarm.cancel()
-            self._refuse_forced(self._unforced)
+            self._give_up_by_hand(self._unforced)
 
     async def met(self) -> bool:
         """Wait until there is a connection to it, as long as its start may take; whether there is one."""
@@ -157,23 +158,37 @@ class BoundDevice:
         """Whether something may still come to it that was sent before its first connection here."""
         return asyncio.get_running_loop().time() < self.ready_seconds + self.document.timeout_s
 
-    def force(self, point: Point, value: bool) -> Forcing:
+    def force(self, point: Point, value: bool) -> ByHand:
         """Write a point beside all else; what is returned says what becomes of it."""
         if self.driver.is_stopped:
-            return Forcing(((point, value),), refused=self._unforced)
-        self.forced.append(forcing := Forcing(((point, value),)))
+            return ByHand(refused=self._unforced)
+        forcing = ByHand()
+        self.forced.append((((point, value),), forcing))
         self.kept.awake.set()
         return forcing
 
+    def send_by_hand(self, command: CommandDocument, place: Place) -> ByHand:
+        """Send a command on the connection that stands; what is returned says what becomes of it."""
+        if self.driver.is_stopped or self.unreached:
+            return ByHand(refused=self._unforced)
+        self.sent.append((place.name, sending := ByHand()))
+        self.send(command, place, 0)
+        return sending
+
     @property
     def _unforced(self) -> str:
-        """Why nothing is forced any more once its driver is stopped."""
+        """Why nothing is forced or sent by hand any more."""
         return self.unreached or f"{self.name} was stopped before"
 
-    def _refuse_forced(self, why: str) -> None:
-        """Give up what was to be forced: the device may be something else when there is a connection again."""
-        while self.forced:
-            self.forced.popleft().refused = why
+    def _give_up_by_hand(self, why: str) -> None:
+        """Give up what a person has forced and sent: the device may be something else when it is connected again."""
+        for channel in self.channels.values():
+            for place, _ in self.sent:
+                channel.withdraw(place)
+        for one in (*(one for _, one in self.forced), *(one for _, one in self.sent)):
+            one.refused = why
+        self.forced.clear()
+        self.sent.clear()
 
     @property
     def is_out_of_reach(self) -> bool:
@@ -297,7 +312,7 @@ class BoundDevice:
         """There is no connection, or none any more."""
         if self.is_ready.is_set():
             self.is_ready.clear()
-            self._refuse_forced(why)
+            self._give_up_by_hand(why)
             if self.contacts.contacts:
                 self._emergency(self.contacts.lost(why))
             self._alarm(self.document.grace_s, why)
@@ -325,7 +340,7 @@ class BoundDevice:
         """What is to be written now."""
         self.writing = None
         if self.forced:
-            return self.forced[0].writes  # until it is confirmed
+            return self.forced[0][0]  # until it is confirmed
         if not self.driver.may_move:
             return None
         for channel in self.channels.values():
@@ -337,7 +352,7 @@ class BoundDevice:
     def written(self) -> None:
         """The device has confirmed that."""
         if (channel := self.writing) is None:
-            self.forced.popleft().is_written = True
+            self.forced.popleft()[1].is_done = True
         else:
             for outcome in channel.written():
                 self._said(outcome)
@@ -411,6 +426,9 @@ class BoundDevice:
         order = outcome.order
         match outcome.said:
             case Said.TAKEN:
+                if by_hand := [one for one in self.sent if one[0] == order.place]:
+                    self.sent.remove(by_hand[0])
+                    by_hand[0][1].is_done = True
                 if self.driver.listener is not None:
                     self.driver.listener.taken(order.place, order.entry)
             case Said.FAILED:

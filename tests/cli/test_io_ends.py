@@ -235,6 +235,17 @@ def test_value_that_a_device_refuses_is_written_once_and_an_error_at_the_end(
     assert said[-1] == "error: --force a.key=1 was not written: it does not take that"
 
 
+def test_command_for_a_device_that_is_not_there_is_not_sent_and_an_error_at_the_end(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    net, bind = tmp_path / "arm.firable.yaml", tmp_path / "arm.bind.yaml"
+    net.write_text(NET)
+    bind.write_text(BIND.replace("port: PORT", "port: /dev/nobody-is-here, start_s: 0.2"))
+    assert firable(["io", str(bind), "--net", str(net), "--send", "a.away", "--for", "1"]) == 1
+    why = "line is not connected: /dev/nobody-is-here: No such file or directory"
+    assert capsys.readouterr().err.splitlines()[-1] == f"error: --send a.away was not taken: {why}"
+
+
 def test_value_that_could_not_be_written_is_an_error_also_when_io_is_asked_to_end(tmp_path: Path) -> None:
     bind = tmp_path / "arm.bind.yaml"
     bind.write_text(FORCED.replace("driver: theirs, memory: refusing", "driver: serial, port: /dev/nobody-is-here"))
