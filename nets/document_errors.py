@@ -21,7 +21,7 @@ from firable.nets.diagnostics import Diagnostic, Subject, did_you_mean
 from firable.nets.source import Source, quoted
 from firable.nets.text_positions import bounded
 from firable.nets.yaml_tree import Mapping as MappingNode
-from firable.nets.yaml_tree import Node, Path, Scalar, Sequence, node_span, nodes_along
+from firable.nets.yaml_tree import Node, Path, Scalar, Sequence, as_written, node_span, nodes_along
 
 _QUOTED: Final = re.compile(r"'([^']*)'")
 ERRORS_MAX: Final = 200  # enough to join and to read; a file of noise has millions
@@ -184,7 +184,7 @@ def _of_the_kind(error: _Error) -> _Error:
 def _problem(source: Source, tree: Node, shape: Shape, error: _Error, unknown: Collection[Path]) -> Diagnostic | None:
     """What an error says; None where the error at one of the `unknown` keys says it."""
     kind, context = error.kind, error.context
-    path = shape.in_file(error.path)
+    path = as_written(tree, shape.in_file(error.path))
     if misplaced := _misplaced(source, tree, shape, path, kind) or _of_another_table(source, tree, shape, path):
         return misplaced
     known = shape.keys_at(error.path[:-1])
@@ -338,6 +338,8 @@ def _wanted(kind: str, context: Mapping[str, Any], node: Node, path: Path) -> st
             return f"two formulas are expected: `[a, b]`, or `{_FORMS['leads_to']}`"
         case "model_type" if path[-1:] == ("within",):
             return "a time is expected, such as `5s`, or a mapping with `time: 5s`"
+        case "list_type" | "too_short" if path[-1:] == ("departures",):
+            return "`{station: NAME}`, or a list of these, is expected"
         case "nothing_given":
             return f"write it, or leave `{path[-1]}` out for what holds without it"
         case "no_arcs":

@@ -341,6 +341,16 @@ def nodes_along(node: Node, path: Path) -> Iterator[tuple[Scalar | None, Node]]:
                 return
 
 
+def as_written(tree: Node, path: Path) -> Path:
+    """The path in the tree, without a 0 where one mapping stands for a list of it alone."""
+    written: Path = ()
+    for step in path:
+        *_, (_, node) = nodes_along(tree, written)
+        if not (step == 0 and isinstance(node, Mapping)):
+            written = (*written, step)
+    return written
+
+
 def node_span(source: Source, node: Node) -> Span:
     """The span at which a node begins, as long as it is where it is a scalar on one line."""
     return source.span(node.line, node.column, node.length if isinstance(node, Scalar) else 1)

@@ -126,8 +126,8 @@ class Stage:
 
         A token that leaves by the completion has its command done, also where gates are free and no signal came.
         """
-        gone = self.plant.departures.station
-        scene = replace(scene, pieces=tuple(piece for piece in scene.pieces if piece.on != gone))
+        staying = tuple(piece for piece in scene.pieces if self.plant.departure(piece.on) is None)
+        scene = replace(scene, pieces=staying)
         for name in transitions:
             if name not in self.net.transition_index:
                 continue

@@ -47,7 +47,7 @@ def top_view(plant: PlantModel) -> dict[str, Any]:
         "arms": arms,
         "others": others,
         "arrivals": plant.arrivals.station,
-        "departures": plant.departures.station,
+        "departures": [departure.station for departure in plant.departures],
     }
 
 

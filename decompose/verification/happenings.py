@@ -46,7 +46,7 @@ from firable.decompose.verification.plant import (
     target_of,
 )
 from firable.nets.machines.loop import Faults, Sending
-from firable.nets.machines.plant_file import Action, Carry, Clamp, Grasp, Move, Process, Put, Release, Stop
+from firable.nets.machines.plant_file import Action, Carry, Clamp, Departure, Grasp, Move, Process, Put, Release, Stop
 from firable.nets.net import Place, Transition
 
 Changes = dict[str, Value]
@@ -101,7 +101,8 @@ class Plant(Things):
         for name in self.sensed:
             yield f"{name}/shown", partial(self.comes_to_be_shown, name)
         yield f"arrives/{self.model.arrivals.station}", self.arrives
-        yield f"leaves/{self.model.departures.station}", self.leaves
+        for out in self.model.departures:
+            yield f"leaves/{out.station}", partial(self.leaves, out)
         for station in sorted(self.judged):
             yield f"{station}/judged", partial(self.judges, station)
         for name, sensor in self.model.sensors.items():
@@ -405,14 +406,14 @@ class Plant(Things):
         if state[entry] is None:
             yield from ({entry: "raw", **seen} for seen in self.sensors_see({entry: "raw"}, state))
 
-    def leaves(self, state: State) -> Iterator[Changes]:
-        """A finished workpiece is taken away from the last station; an unfinished one is an accident, unless workpieces
-        come there, too: it waits to be machined."""
-        last = f"has {self.model.departures.station}"
-        if state[last] == self.kinds[-1]:
+    def leaves(self, out: Departure, state: State) -> Iterator[Changes]:
+        """A finished workpiece is taken away from a last station; an unfinished one is an accident, unless it may leave
+        so, or workpieces come there, too: it waits to be machined."""
+        last = f"has {out.station}"
+        if state[last] == self.kinds[-1] or (out.raw and state[last] is not None):
             gone = self.unjudged({last: None})
             yield from ({**gone, **seen} for seen in self.sensors_see(gone, state))
-        elif state[last] is not None and self.model.arrivals.station != self.model.departures.station:
+        elif state[last] is not None and self.model.arrivals.station != out.station:
             yield {ACCIDENT: True}
 
     def wavers(self, name: str, way: str, state: State) -> Iterator[Changes]:

@@ -193,7 +193,7 @@ class Asked:
         model = self.plant.model
         sensors = model.sensors.values()
         restless = any(one.may_flicker or one.may_linger or one.acknowledges is not None for one in sensors)
-        passes = model.departures.station == model.arrivals.station
+        passes = any(out.station == model.arrivals.station for out in model.departures)
         return (restless or passes) and not _never_a_deadlock(prop) and _speaks_of_deadlock(prop)
 
 

@@ -92,8 +92,9 @@ class _Arrival:
 
 @dataclass(frozen=True, slots=True)
 class _Departure:
-    """A workpiece at the end is taken away, if it is still there."""
+    """A workpiece at an end is taken away, if it is still there."""
 
+    station: str
     id: int
 
 
@@ -261,8 +262,8 @@ class Plant:
             case _Arrival():
                 self.arrival_due = True
                 self._arrive()
-            case _Departure(id_):
-                self._depart(id_)
+            case _Departure(station, id_):
+                self._depart(station, id_)
             case _Finish(machine, busy):
                 now = self.machines[machine]
                 if now.busy is busy:
@@ -288,9 +289,8 @@ class Plant:
             if self.to_come:
                 self._in(arrivals.every_s, arrivals.jitter_s, _Arrival())
 
-    def _depart(self, id_: int) -> None:
-        station = self.model.departures.station
-        workpiece = self.stations[station]
+    def _depart(self, station: str, id_: int) -> None:
+        workpiece, departure = self.stations[station], self.model.departure(station)
         if workpiece is None or workpiece.id != id_:
             return
         self._gone(station)
@@ -298,7 +298,7 @@ class Plant:
             self._arrive()
         self._wake()
         self.delivered.append(workpiece)
-        if not workpiece.processed and self.machines_workpieces:
+        if not workpiece.processed and self.machines_workpieces and not (departure and departure.raw):
             raise _FaultError(f"workpiece {workpiece.id} leaves the cell without having been machined")
 
     def _begin(self, name: str, busy: _Busy) -> Iterator[PlantReport]:
@@ -436,9 +436,12 @@ class Plant:
 
     def _finished(self, station: str, workpiece: Workpiece) -> None:
         """Have a workpiece taken away at its end; where workpieces arrive there, too, not before it was machined."""
-        is_end = station == self.model.departures.station
-        if is_end and (workpiece.processed or station != self.model.arrivals.station or not self.machines_workpieces):
-            self._in(self.model.departures.after_s, 0.0, _Departure(workpiece.id))
+        departure = self.model.departure(station)
+        if departure is None:
+            return
+        may_go = workpiece.processed or departure.raw or not self.machines_workpieces
+        if may_go or station != self.model.arrivals.station:
+            self._in(departure.after_s, 0.0, _Departure(station, workpiece.id))
 
     def _gone(self, station: str) -> None:
         self.stations[station] = None

@@ -131,13 +131,13 @@ def _of_one(decomposition: Decomposition, name: str, model: PlantModel, latency_
         sensors[signal.name] = sensor
     near = {station for one in own.values() for station in _reached(one)}
     near |= {sensor.station for sensor in sensors.values() if sensor.station is not None}
-    ends = {model.arrivals.station, model.departures.station}
+    ends = {model.arrivals.station, *(departure.station for departure in model.departures)}
     # Where workpieces come and go out of reach, that would only multiply what is believed.
     nowhere = "elsewhere"
     update = {"machines": own, "sensors": sensors, "stations": [*sorted(near | ends), nowhere]}
-    for end in ("arrivals", "departures"):
-        if getattr(model, end).station not in near:
-            update[end] = getattr(model, end).model_copy(update={"station": nowhere})
+    if model.arrivals.station not in near:
+        update["arrivals"] = model.arrivals.model_copy(update={"station": nowhere})
+    update["departures"] = [departure for departure in model.departures if departure.station in near]
     others_at = sorted((touched | ends | set(unknown)) & near)
     local = model.model_copy(update=update)
     return Monitor(subnet, local, latency_seconds=latency_seconds, elsewhere=others_at)

@@ -364,12 +364,14 @@ class _Closing:
             yield from self.ended(f"sent/{name}", each(cleared, self.laws.refused(place)))
 
     def workpieces(self, start: list[Moment]) -> Iterator[Transition]:
-        entry, exit_ = self.model.arrivals.station, self.model.departures.station
+        entry = self.model.arrivals.station
         arrived = chain.from_iterable(map(self.seen, each(start, [self.laws.arrives()])))
         yield from self.named(f"arrives/{entry}", f"a workpiece comes to {entry}", arrived)
-        gone = chain.from_iterable(map(self.seen, each(start, self.laws.departs())))
-        yield from self.named(f"leaves/{exit_}", f"the workpiece on {exit_} is taken away", gone)
-        yield from self.ended(f"leaves/{exit_}", each(start, self.laws.departs_raw()))
+        for departure in self.model.departures:
+            exit_ = departure.station
+            gone = chain.from_iterable(map(self.seen, each(start, self.laws.departs(departure))))
+            yield from self.named(f"leaves/{exit_}", f"the workpiece on {exit_} is taken away", gone)
+            yield from self.ended(f"leaves/{exit_}", each(start, self.laws.departs_raw(departure)))
         for station in self.model.stations:
             judged = each(start, self.laws.judges(station)) if station in self.laws.judged else []
             yield from self.named(f"{station}/judged", f"the workpiece on {station} is judged", judged)

@@ -29,6 +29,7 @@ from firable.nets.machines.plant_file import (
     Action,
     Carry,
     Clamp,
+    Departure,
     Grasp,
     Machine,
     Move,
@@ -378,20 +379,22 @@ class Laws:
         yield Case(wants, ((verdicts[True], True),), "passes", "and is found good")
         yield Case(wants, ((verdicts[False], True),), "fails", "and is not found good")
 
-    def departs(self) -> Iterator[Case]:
-        """A finished workpiece is taken away."""
-        station = self.model.departures.station
-        kind, empty = self.has(station, self.kinds[-1]), self.empty(station)
-        gone = Case(((kind, True), (empty, False)), ((kind, False), (empty, True)))
-        yield from map(gone.with_, self._judged_no_more(station))
+    def departs(self, departure: Departure) -> Iterator[Case]:
+        """A finished workpiece is taken away, or any, where they may be raw."""
+        station, finished = departure.station, self.kinds[-1:]
+        for kind in self.kinds if departure.raw else finished:
+            has, empty = self.has(station, kind), self.empty(station)
+            tag = self._tag(kind) if departure.raw else ""
+            gone = Case(((has, True), (empty, False)), ((has, False), (empty, True)), tag)
+            yield from map(gone.with_, self._judged_no_more(station))
 
-    def departs_raw(self) -> Iterator[Case]:
+    def departs_raw(self, departure: Departure) -> Iterator[Case]:
         """The accident that a workpiece leaves which no machine has machined, where one should have.
 
         One that has only come where others are taken away waits there to be machined.
         """
-        station = self.model.departures.station
-        if len(self.kinds) > 1 and station != self.model.arrivals.station:
+        station = departure.station
+        if len(self.kinds) > 1 and not departure.raw and station != self.model.arrivals.station:
             words = "a workpiece leaves the cell without having been machined"
             yield self._accident(((self.has(station, _RAW), True),), "raw", words)
 

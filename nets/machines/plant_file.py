@@ -31,7 +31,7 @@ from firable.nets.document import Name, OptionalName, given
 from firable.nets.document_errors import Shape, document_problems, keys_of, version_problem
 from firable.nets.net import Net, SignalKind
 from firable.nets.source import Source, quoted, read_source
-from firable.nets.yaml_tree import Node, Path, Scalar, data, node_span, nodes_along, parse_tree
+from firable.nets.yaml_tree import Node, Path, Scalar, as_written, data, node_span, nodes_along, parse_tree
 
 SIZE_BYTES_MAX: Final = 1024 * 1024
 
@@ -173,11 +173,12 @@ class Arrivals(_Model):
     jitter_s: Seconds = 0.0
 
 
-class Departures(_Model):
-    """Where finished workpieces are taken away, `after_s` after they arrive."""
+class Departure(_Model):
+    """Where finished workpieces are taken away, `after_s` after they arrive; where they may be `raw`, any are."""
 
     station: Name
     after_s: Seconds = 0.0
+    raw: bool = False
 
 
 class Sensor(_Model):
@@ -221,6 +222,10 @@ class Sensor(_Model):
         return self.likely if self.likely is None or self.passes is not None else 1 - self.likely
 
 
+def _as_list(value: object) -> object:
+    return [value] if isinstance(value, dict) else value
+
+
 class PlantModel(_Model):
     """A whole plant file."""
 
@@ -229,10 +234,18 @@ class PlantModel(_Model):
     description: str = ""
     stations: list[Name]
     arrivals: Arrivals
-    departures: Departures
+    departures: Annotated[
+        list[Departure],
+        BeforeValidator(_as_list, json_schema_input_type=Departure | Annotated[list[Departure], Field(min_length=1)]),
+        Field(min_length=1),
+    ]
     machines: dict[Name, Machine]
     sensors: dict[Name, Sensor] = {}
     _read: tuple[Source, Node] | None = PrivateAttr(default=None)
+
+    def departure(self, station: str) -> Departure | None:
+        """How workpieces are taken away at a station, if they are."""
+        return next((departure for departure in self.departures if departure.station == station), None)
 
     def misfit(self, path: Path, subject: Subject, message: str, hint: str) -> Diagnostic:
         """What does not fit a net (F5003), at the place of the file that a path leads to, as far as it does."""
@@ -257,7 +270,7 @@ SHAPE: Final = Shape(
         for path, model in (
             ((), PlantModel),
             (("arrivals",), Arrivals),
-            (("departures",), Departures),
+            (("departures", "*"), Departure),
             (("machines", "*"), Machine),
             (("sensors", "*"), Sensor),
         )
@@ -287,20 +300,16 @@ def _parse(source: Source) -> PlantModel:
         model = PlantModel.model_validate(data(tree))
     except ValidationError as error:
         raise InputError(document_problems(source, tree, error, SHAPE)) from None
-    problems = [
-        Diagnostic(
-            "F5003",
-            f"{quoted('.'.join(map(str, path)))}: {message}",
-            hint,
-            tuple(map(str, path)),
-            _span(source, tree, path),
-        )
-        for path, message, hint in _inconsistencies(model)
-    ]
-    if problems:
+    if problems := [_contradiction(source, tree, *found) for found in _inconsistencies(model)]:
         raise InputError(problems)
     model._read = (source, tree)
     return model
+
+
+def _contradiction(source: Source, tree: Node, path: Path, message: str, hint: str) -> Diagnostic:
+    path = as_written(tree, path)
+    said = f"{quoted('.'.join(map(str, path)))}: {message}"
+    return Diagnostic("F5003", said, hint, tuple(map(str, path)), _span(source, tree, path))
 
 
 def _span(source: Source, tree: Node, path: Path) -> Span:
@@ -320,7 +329,11 @@ def _inconsistencies(model: PlantModel) -> Iterator[tuple[Path, str, str]]:
             yield path, f"there is no station '{name}'", did_you_mean(name, model.stations) + "see `stations`"
 
     yield from station(("arrivals", "station"), model.arrivals.station)
-    yield from station(("departures", "station"), model.departures.station)
+    ends = [departure.station for departure in model.departures]
+    for i, end in enumerate(ends):
+        yield from station(("departures", i, "station"), end)
+        if end in ends[:i]:
+            yield ("departures", i), f"workpieces leave at '{end}' by an earlier entry", "write each station once"
     for name, machine in model.machines.items():
         path = ("machines", name)
         if name == "safe":

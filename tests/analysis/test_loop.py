@@ -7,7 +7,7 @@ from functools import cache
 from random import Random
 
 import pytest
-from support import inspected_cell
+from support import inspected_cell, rejecting_cell
 from support.bench_cell import COMMANDS, JUDGED, PLANT, bench, free_cell
 from support.examples import seeds
 
@@ -299,6 +299,17 @@ def test_a_cell_that_takes_the_lack_of_one_judgement_for_the_other_is_told_of_an
     assert (
         not check_loop(replace(net, transitions=tuple(wrong)), inspected_cell.plant()).verdict("loop.accidents").holds
     )
+
+
+def test_a_workpiece_that_is_thrown_out_as_it_came_is_an_accident_unless_it_may_leave_raw() -> None:
+    net = rejecting_cell.net()
+    assert all(verdict.holds for verdict in check_loop(net, rejecting_cell.plant()).verdicts)
+    found = check_loop(net, rejecting_cell.plant(rejecting_cell.PLANT.replace(", raw: true", "")))
+    accident = found.verdict("loop.accidents")
+    assert accident.witness is not None
+    assert accident.witness.firings[-1] == ("leaves/bin/raw",)
+    one = rejecting_cell.PLANT.replace("  - {station: bin, after_s: 2, raw: true}\n", "")
+    assert not check_loop(net, rejecting_cell.plant(one)).verdict("loop.deadlock-free").holds, "the bin fills up"
 
 
 def test_a_budget_that_ends_leaves_the_loop_unknown() -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
 import pytest
+from support import rejecting_cell
 
 from firable.cli.view.runs import Run
 from firable.cli.view.scene import Piece, Stage
@@ -138,6 +140,13 @@ def test_a_scene_that_the_plant_cannot_have_is_refused(damage: dict[str, object]
     stage = Stage(catalogue_net("one_robot"), plant("one_robot"))
     with pytest.raises(InputError, match="F5070"):
         stage.of_json({**stage.begin().to_json(), **damage})
+
+
+def test_workpieces_are_gone_from_each_way_out_with_the_next_firing() -> None:
+    stage = Stage(rejecting_cell.net(), rejecting_cell.plant())
+    assert top_view(stage.plant)["departures"] == ["exit", "bin"]
+    scene = replace(stage.begin(), pieces=(Piece(1, "exit"), Piece(2, "bin"), Piece(3, "table")))
+    assert [piece.on for piece in stage.fired(scene, ["t1"], sends=False).pieces] == ["table"]
 
 
 def test_a_plant_with_one_machine_and_no_line_has_a_view() -> None:

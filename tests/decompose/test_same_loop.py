@@ -9,8 +9,8 @@ from functools import cache
 from typing import Any
 
 import pytest
-from support import inspected_cell
-from support.bench_cell import JUDGED, bench, free_cell
+from support import inspected_cell, rejecting_cell
+from support.bench_cell import JUDGED, LEAVING_RAW, bench, free_cell
 from support.together_cell import BELT_PLANT, belts, together
 
 from firable.decompose.verification import same_loop
@@ -408,10 +408,24 @@ def test_a_judgement_that_both_readings_keep_is_found(monkeypatch: pytest.Monkey
     monkeypatch.setattr(Plant, "unjudged", lambda _, changes: changes)
     monkeypatch.setattr(Laws, "_judged_no_more", lambda *_: iter([Case()]))
     plant = Plant(net, model)
-    name = f"leaves/{model.departures.station}"
+    name = f"leaves/{model.departures[0].station}"
     some = by_happening(plant, close(net, model, sending=Sending.LATE).net.transitions)[name]
     with pytest.raises(DiffersError, match=r"nothing lies on exit, and it was found (good|bad)"):
         compare_one(plant, name, some)
+
+
+@pytest.mark.parametrize(("sending", "faults"), KINDS)
+def test_ways_out_are_the_same_in_both_readings_and_one_that_is_forgotten_or_mistaken_is_found(
+    sending: Sending, faults: Faults, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for net, model in ((rejecting_cell.net(), rejecting_cell.plant()), (free_cell(), bench(leaving=LEAVING_RAW))):
+        loop = close(net, model, faults, sending)
+        assert compare(Plant(net, model, sending, faults), loop) > 2 * len(loop.net.transitions)
+        first, second = model.departures
+        for others in ([first], [second], [first, second.model_copy(update={"raw": False})]):
+            other = close(net, model.model_copy(update={"departures": others}), faults, sending)
+            with pytest.raises(DiffersError):
+                compare(Plant(net, model, sending, faults), other)
 
 
 def test_cameras_that_are_taken_for_each_other_are_a_difference(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -22,7 +22,7 @@ from firable.executor.operating.monitor import Divergence
 from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError
-from firable.nets.machines.plant_file import parse_plant
+from firable.nets.machines.plant_file import Departure, parse_plant
 from firable.nets.text import parse_net
 from firable.semantics.joining import APPLIED
 from firable.semantics.trace import Event, Fired, Noted, SignalChanged, Trace
@@ -72,6 +72,18 @@ def test_machines_that_keep_to_their_plant_file_diverge_at_no_host(cell: str) ->
         for controller in names(cell):
             assert diverges(cell, [controller], trace) is None, controller
         assert diverges(cell, names(cell), trace) is None
+
+
+@pytest.mark.parametrize("station", ["mc_table", "cv1_end"])
+def test_machines_that_keep_to_a_plant_file_with_several_ways_out_diverge_at_no_host(station: str) -> None:
+    """Some of them out of the reach of a host, some not; the run needs but one."""
+    model, trace = catalogue_plant("one_robot"), run_of("one_robot", seed=0)
+    more = [Departure(station=station, raw=True), *model.departures]
+    for controller in names("one_robot"):
+        monitor = LocalMonitor(cut("one_robot"), [controller], model.model_copy(update={"departures": more}))
+        for event in seen_at("one_robot", [controller], trace):
+            monitor.seen(event)
+        assert monitor.divergence is None, controller
 
 
 def of_inspection(controllers: list[str], trace: Trace) -> Divergence | None:

@@ -13,7 +13,7 @@ from dataclasses import replace
 from functools import cache
 
 import pytest
-from support import inspected_cell
+from support import inspected_cell, rejecting_cell
 from support.following import followed
 from support.stale_cells import carried, stopped
 from support.together_cell import together
@@ -81,6 +81,23 @@ def test_a_run_in_which_workpieces_are_judged_is_one_of_the_loop(sending: Sendin
         with pytest.raises(AssertionError, match=f"does not show {other} = 1"):
             followed(loop, replace(trace, events=(*events[: where + 1], both, *events[where + 1 :])))
     assert {"accept", "reject"} < ways
+
+
+@pytest.mark.parametrize("sending", Sending)
+def test_a_run_in_which_workpieces_leave_by_two_ways_is_one_of_the_loop(sending: Sending) -> None:
+    net, plant = rejecting_cell.net(), rejecting_cell.plant()
+    state, trace = run_of(net, plant, 8)
+    assert state is State.DONE
+    fired = [name for event in trace.events if isinstance(event, Fired) for name in event.transitions]
+    assert {"reject", "t6"} < {*fired}
+    assert followed(close(net, plant, sending=sending), trace) == len(fired)
+
+
+def test_a_workpiece_that_leaves_raw_where_it_may_not_is_a_fault() -> None:
+    plant = rejecting_cell.plant(rejecting_cell.PLANT.replace(", raw: true", ""))
+    state, trace = run_of(rejecting_cell.net(), plant, 8)
+    assert state is State.FAULT
+    assert followed(close(rejecting_cell.net(), plant), trace) > 0
 
 
 def test_two_cells_in_a_line_carry_their_workpieces_through_as_the_loop_allows() -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from support import inspected_cell, together_cell
-from support.bench_cell import COMMANDS, JUDGED, bench, free_cell
+from support.bench_cell import COMMANDS, JUDGED, LEAVING, LEAVING_RAW, bench, free_cell
 from support.examples import seeds
 
 from firable.analysis.loop.verdicts import check_loop
@@ -460,7 +460,7 @@ class Twin:
             self.plant._arrive()
             return []
         if what == "leaves":
-            return self.plant._lawful("", self.departing())
+            return self.plant._lawful("", self.departing(of.partition("/")[0]))
         if of.startswith("judged/"):
             self.plant.found_good[what] = of == "judged/passes"
             return []
@@ -471,10 +471,10 @@ class Twin:
         assert isinstance(busy, Busy)
         return self.plant._lawful(what, self.plant._happen(Finish(what, busy)))
 
-    def departing(self) -> Iterator[PlantReport]:
-        leaving = self.plant.stations[self.plant.model.departures.station]
+    def departing(self, station: str) -> Iterator[PlantReport]:
+        leaving = self.plant.stations[station]
         assert leaving is not None
-        self.plant._depart(leaving.id)
+        self.plant._depart(station, leaving.id)
         yield from ()
 
     def compare(self) -> None:
@@ -525,9 +525,10 @@ class Twin:
 @pytest.mark.seeds
 @pytest.mark.parametrize("seed", seeds(20))
 @pytest.mark.parametrize("judged", ["", JUDGED], ids=["", "judged"])
-def test_the_loop_and_the_simulated_cell_obey_the_same_laws(seed: int, judged: str) -> None:
+@pytest.mark.parametrize("leaving", [LEAVING, LEAVING_RAW], ids=["", "two ways out"])
+def test_the_loop_and_the_simulated_cell_obey_the_same_laws(seed: int, judged: str, leaving: str) -> None:
     draw = random.Random(seed)
-    twin = Twin(free_cell(judged=bool(judged)), bench(judged=judged))
+    twin = Twin(free_cell(judged=bool(judged)), bench(judged=judged, leaving=leaving))
     for _ in range(60):
         choices = twin.player.firable(twin.marking)
         # Accidents end a walk, so they are left for the end, where one is seen to happen in both.

@@ -79,9 +79,16 @@ JUDGED = """\
 """Cameras at every station: where workpieces come, where they are machined, where they go."""
 
 
-def bench(extra: str = "", judged: str = "") -> PlantModel:
-    """The plant, with something added to its first sensor, and more sensors."""
-    return parse_plant(PLANT.replace("{occupied: entry}", f"{{occupied: entry{extra}}}") + judged)
+LEAVING = "{station: exit, after_s: 1}"
+"""Where workpieces leave."""
+LEAVING_RAW = f"[{LEAVING}, {{station: table, raw: true}}]"
+"""Two ways out, of which one is where workpieces are machined, before or after that."""
+
+
+def bench(extra: str = "", judged: str = "", leaving: str = LEAVING) -> PlantModel:
+    """The plant, with something added to its first sensor, more sensors, and other ways out."""
+    text = PLANT.replace("{occupied: entry}", f"{{occupied: entry{extra}}}").replace(LEAVING, leaving)
+    return parse_plant(text + judged)
 
 
 def free_cell(chosen: tuple[str, ...] = tuple(COMMANDS), *, judged: bool = False) -> Net:

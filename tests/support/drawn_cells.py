@@ -360,7 +360,7 @@ class _Drawing:
         return {**{word: names for word, names in found.items() if names}, "places": places or {"idle": {}}}
 
     def plant(self) -> Document:
-        return {
+        found: Document = {
             "firable_plant": 1,
             "plant": "drawn",
             "stations": self.stations,
@@ -369,6 +369,15 @@ class _Drawing:
             "machines": self.machines,
             "sensors": dict(self.draw.sample([*self.sensors.items()], len(self.sensors))),
         }
+        if self.draw.random() < 0.3:
+            found["departures"] = self.ways_out(found["departures"])
+        return found
+
+    def ways_out(self, first: Document) -> list[Document]:
+        """Some workpieces leave elsewhere, or as they came."""
+        others = [station for station in self.stations if station != self.exit]
+        second = {"station": self.draw.choice(others), "after_s": self.seconds(0.2, 3)} if others else {}
+        return [{**one, "raw": True} if self.draw.random() < 0.4 else one for one in (first, second) if one]
 
 
 def _of(controller: str, names: Collection[str]) -> list[str]:

@@ -76,7 +76,7 @@ async def served(
     ends: dict[str, FarEnd] = {"serial": line, **ends_of(binding.without({"serial"}))}
     model = plant_of("one_robot")
     # Its last sensor would show a workpiece for 20 ms, which no busy machine sees.
-    departures = model.departures.model_copy(update={"after_s": 25.0})
+    departures = [departure.model_copy(update={"after_s": 25.0}) for departure in model.departures]
     model = model.model_copy(update={"departures": departures})
     plant = Plant(model, workpieces=workpieces, disturbances=disturbances)
     said: list[str] = []

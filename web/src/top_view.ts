@@ -34,7 +34,7 @@ interface View {
   arms: Record<string, Arm>;
   others: Record<string, Spot>;
   arrivals: string;
-  departures: string;
+  departures: string[];
 }
 
 export type TopStart = { why_not: string } | (Top & { view: View });
@@ -112,10 +112,10 @@ export class TopView {
     for (const [name, [x, y]] of Object.entries(view.stations)) {
       const station = svg("g", { class: "station" });
       const title = svg("title");
-      title.textContent = `${name}${name === view.arrivals ? ", where workpieces come" : name === view.departures ? ", where they leave" : ""}`;
+      title.textContent = `${name}${name === view.arrivals ? ", where workpieces come" : view.departures.includes(name) ? ", where they leave" : ""}`;
       station.append(title, svg("rect", { x: x - WIDTH / 2, y: y - WIDTH / 2, width: WIDTH, height: WIDTH, rx: 5 }));
       if (name === view.arrivals) station.append(svg("path", { d: `M${x - 58} ${y}h22m-8 -7l8 7l-8 7`, class: "way" }));
-      if (name === view.departures) station.append(svg("path", { d: `M${x + 36} ${y}h22m-8 -7l8 7l-8 7`, class: "way" }));
+      if (view.departures.includes(name)) station.append(svg("path", { d: `M${x + 36} ${y}h22m-8 -7l8 7l-8 7`, class: "way" }));
       this.drawing.append(station);
     }
     this.drawing.append(this.layer);
