@@ -49,7 +49,7 @@ class _Waiting:
         self.space, self.fairness, self.ranks = space, claim.fairness, of.ranks
         self.asked, self.answered = space.where(claim.state_goal), space.where(claim.then)
         self.helpful = {prefix: space.net.transition_index[name] for prefix, name in of.helpful}
-        self.enabled = [frozenset(space.player.may_fire(m)) if of.helpful else frozenset() for m in space.markings]
+        self.enabled = [frozenset(t for fired, _ in firings for t in fired) for firings in space.edges]
         if len(self.helpful) != len(of.helpful) or list(self.helpful) != sorted(self.helpful):
             refuse("the ranks that a transition helps are not in order")
 

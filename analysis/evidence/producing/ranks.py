@@ -26,16 +26,18 @@ def progress(graph: ReachabilityGraph, space: Markings, claim: Claim) -> Progres
     """The ranks that show a response on a complete graph; None where a component gives no reason."""
     asked, answered = graph.satisfying(claim.state_goal), graph.satisfying(claim.then)
     edges: dict[int, list[tuple[FiringSet, int]]] = {}
+    enabled: dict[int, frozenset[int]] = {}
     todo = [i for i in range(graph.n_markings) if asked[i] and not answered[i]]
     seen = set(todo)
     while todo:
         i = todo.pop()
-        edges[i] = [(fired, after) for fired, after in graph.successors(i) if not answered[after]]
+        leaving = list(graph.successors(i))
+        enabled[i] = frozenset(t for fired, _ in leaving for t in fired)
+        edges[i] = [(fired, after) for fired, after in leaving if not answered[after]]
         for _, after in edges[i]:
             if after not in seen:
                 seen.add(after)
                 todo.append(after)
-    enabled = {i: frozenset(graph.witnesses.player.may_fire(graph.marking(i))) for i in edges}
     ranks, helpful = dict[int, Rank](), dict[Rank, int]()
     pieces: list[tuple[Iterable[int], Rank]] = [(edges, ())]
     while pieces:
