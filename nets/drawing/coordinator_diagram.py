@@ -23,6 +23,7 @@ from firable.nets.decomposition import ArbitrationGroup, Coordinated, Decomposit
 from firable.nets.drawing.colours import colours
 from firable.nets.drawing.coordinator_words import LABEL_CHARACTERS, count, hint, labels, over, rule, told_of
 from firable.nets.drawing.layout import arranged
+from firable.nets.drawing.legend import ROW_HEIGHT, legend_rows
 from firable.nets.drawing.panels import panels
 from firable.nets.drawing.sheet import MARGIN, TOP, least_width, opening, scoped
 from firable.nets.drawing.text import NAME, NOTE, width_of, wrapped
@@ -119,6 +120,7 @@ class _Writer:
         self.width = max(
             [panel.right + MARGIN for panel in self.panels] + [least_width(self.net.name, self._caption()), 480.0]
         )
+        self.legend = self._legend_rows()
 
     def _order(self) -> tuple[list[str], Mapping[str, tuple[float, int]]]:
         """The controllers as they stand in the picture of the net, each coordinator before those under it, together."""
@@ -220,7 +222,7 @@ class _Writer:
     def _caption(self) -> str:
         n = len(self.rows)
         wide = sum(row.is_global for row in self.rows)
-        others = f", and {n - wide} that compete with them" if n > wide else ""
+        others = f", and {n - wide} that compete{'s' * (n - wide == 1)} with them" if n > wide else ""
         of = count(len(self.owners), "controller")
         return f"Coordinator diagram: {count(wide, 'global transition')} of {of}{others}"
 
@@ -235,7 +237,8 @@ class _Writer:
             y += 26
         title = f"{self.net.name}: coordinator diagram"
         style = scoped("coordinator", _STYLE)
-        yield from opening(self.width, y + 24, style, title, self.net.name, self._caption(), scope="coordinator")
+        height = y + 24 + ROW_HEIGHT * (len(self.legend) - 1)
+        yield from opening(self.width, height, style, title, self.net.name, self._caption(), scope="coordinator")
         yield from body
         yield from self._legend(y)
         yield "</svg>"
@@ -376,12 +379,8 @@ class _Writer:
         yield f'<path class="apart" d="{apart}"/>'
         yield f'<path class="group" d="M{px(x)} {px(ys[0])}V{px(ys[-1])}{ends}"/></g>'
 
-    def _legend(self, y: float) -> Iterator[str]:
-        x = MARGIN
-
-        def words(text: str, at: float) -> str:
-            return f'<text class="note" x="{px(at)}" y="{px(y + 3.5)}">{esc(text)}</text>'
-
+    def _legend_rows(self) -> list[list[tuple[float, str, str]]]:
+        """The signs that the picture uses, in rows as wide as it is."""
         items = []
         if self.rows:
             items.append(("decision", "decided by a coordinator, when every part has voted yes"))
@@ -390,12 +389,16 @@ class _Writer:
             items.append(("reads", "part that votes and locks, and moves no token"))
         if self.groups:
             items.append(("group", "compete: at most one of them is decided at a time"))
-        for css, text in items:
-            if css == "group":
-                yield f'<path class="group" d="M{px(x + 14)} {px(y - 6)}h-8v12h8"/>'
-            elif css == "decision":
-                yield f'<rect class="decision" x="{px(x)}" y="{px(y - 7)}" width="34" height="14" rx="7"/>'
-            else:
-                yield f'<rect class="{css}" x="{px(x)}" y="{px(y - 3.5)}" width="34" height="7" rx="1.5"/>'
-            yield words(text, x + 42)
-            x += 42 + width_of(text, NOTE) + 14
+        return legend_rows(items, self.width)
+
+    def _legend(self, top: float) -> Iterator[str]:
+        for k, row in enumerate(self.legend):
+            y = top + ROW_HEIGHT * k
+            for x, css, text in row:
+                if css == "group":
+                    yield f'<path class="group" d="M{px(x + 14)} {px(y - 6)}h-8v12h8"/>'
+                elif css == "decision":
+                    yield f'<rect class="decision" x="{px(x)}" y="{px(y - 7)}" width="34" height="14" rx="7"/>'
+                else:
+                    yield f'<rect class="{css}" x="{px(x)}" y="{px(y - 3.5)}" width="34" height="7" rx="1.5"/>'
+                yield f'<text class="note" x="{px(x + 42)}" y="{px(y + 3.5)}">{esc(text)}</text>'

@@ -11,6 +11,7 @@ from firable.nets.catalogue import catalogue_net
 from firable.nets.drawing import draw_coordinator
 from firable.nets.drawing.panels import panels
 from firable.nets.net import Controller, Net, Place, Transition
+from firable.nets.text import parse_net
 
 SVG = "{http://www.w3.org/2000/svg}"
 CELLS = ["one_robot", "one_robot_mc_late", "two_cells", "manufacturing_cells-8", "conceptual_one_robot"]
@@ -114,6 +115,31 @@ def test_words_stay_in_the_box_of_their_controller(name: str) -> None:
         right = float(box.get("x", "")) + float(box.get("width", ""))
         for text in group.iter(f"{SVG}text"):
             assert float(text.get("x", "")) + 5.4 * len(text.text or "") < right
+
+
+NARROW = """\
+firable: 1
+cell: narrow
+controllers:
+  a: {start: [free, seen], places: {free: , busy: , seen: }}
+  b: {start: idle, places: {idle: , one: , other: }}
+transitions:
+  go: {from: [a.free, b.idle], to: [a.busy, b.one]}
+  see: {from: b.idle, to: b.other, if: a.seen}
+  back: {from: [a.busy, b.one], to: [a.free, b.idle]}
+  done: {from: b.other, to: b.idle}
+"""
+
+
+def test_the_legend_of_a_narrow_picture_ends_in_it() -> None:
+    svg = ET.fromstring(draw_coordinator(split(parse_net(NARROW))))
+    words = ["moves no token", "is decided at a time"]
+    legend = [text for text in svg.iter(f"{SVG}text") if (text.text or "").endswith(tuple(words))]
+    assert len(legend) == len(words)
+    for text in legend:
+        assert float(text.get("x", "")) + 5.4 * len(text.text or "") < float(svg.get("width", ""))
+        assert float(text.get("y", "")) < float(svg.get("height", ""))
+    assert any("and 1 that competes with them" in (text.text or "") for text in svg.iter(f"{SVG}text"))
 
 
 def test_lanes_are_cut_where_the_fewest_transitions_have_parts_on_both_sides() -> None:
