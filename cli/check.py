@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -328,6 +329,6 @@ def _show(report: Report, *, verbose: bool) -> None:
     documents = [file for file in report.files if is_evidence(file)]
     for file in report.files:
         if file not in documents:
-            click.echo(f"  replay it: firable replay {file} --net {report.input}")
+            click.echo(f"  replay it: firable replay {shlex.quote(file)} --net {shlex.quote(report.input)}")
     for file in documents:
-        click.echo(f"  evidence: firable verify {file}")
+        click.echo(f"  evidence: firable verify {shlex.quote(file)}")

@@ -6,6 +6,7 @@ the words of another technique) is then asked by the commands for nets, and no o
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -168,5 +169,6 @@ def show_loop(report: Report, *, verbose: bool) -> None:
         if is_schema(file):
             click.echo(f"  {schema_told(file)}")
         else:
-            of = "evidence: firable verify" if is_evidence(file) else "the loop as a net file:"
-            click.echo(f"  {of} {Path(file)}")
+            name = str(Path(file))
+            verified = f"evidence: firable verify {shlex.quote(name)}"
+            click.echo(f"  {verified if is_evidence(file) else f'the loop as a net file: {name}'}")

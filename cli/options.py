@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -215,9 +216,10 @@ def refuse_a_net(file: str, wanted: str, then: str = "") -> None:
             raise click.UsageError(f"'{file}' is {what}, and {wanted}")
     if file.startswith(CATALOGUE) or Path(file).suffix.lower() in PNML_SUFFIXES | TEXT_SUFFIXES:
         bundle = f"{Path(file.removeprefix(CATALOGUE)).name.partition('.')[0] or 'net'}.bundle"
+        made = f"firable bundle {shlex.quote(file)} -o {shlex.quote(bundle)}"
         raise click.UsageError(
-            f"'{file}' is a net, and {wanted}: make a bundle by `firable bundle {file} -o {bundle}`"
-            + (f", then `{then} {bundle}`" if then else "")
+            f"'{file}' is a net, and {wanted}: make a bundle by `{made}`"
+            + (f", then `{then} {shlex.quote(bundle)}`" if then else "")
         )
 
 

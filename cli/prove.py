@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import replace
 from textwrap import indent
 from typing import TYPE_CHECKING, Final
@@ -181,7 +182,7 @@ def _show(report: Report, answered: Sequence[Answered]) -> None:
         documents = [file for file in report.files if ".evidence.json" in file]
         click.echo(f"  {len(report.files) - len(documents)} SMT-LIB 2 files in {Path(report.files[0]).parent}")
         for file in documents:
-            click.echo(f"  evidence: firable verify {file}")
+            click.echo(f"  evidence: firable verify {shlex.quote(file)}")
 
 
 def _show_votes(report: Report, free: Sequence[tuple[str, str]] | None) -> None:

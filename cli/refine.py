@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from textwrap import indent
 from typing import TYPE_CHECKING
 
@@ -293,7 +294,7 @@ def _show(report: Report) -> None:
     text.show_summary(report)
     for file in report.files:
         if file.endswith((".evidence.json", ".evidence.json.gz")):
-            click.echo(f"  evidence: firable verify {file}")
+            click.echo(f"  evidence: firable verify {shlex.quote(file)}")
         elif is_schema(file):
             click.echo(f"  {schema_told(file)}")
         else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -69,7 +70,9 @@ def replay(
     from firable.nets.loading import is_bundle
 
     if (bundle := next(filter(is_bundle, traces), None)) is not None:
-        raise click.UsageError(f"'{bundle}' is a bundle and no trace: `firable replay TRACE --net {bundle}`")
+        raise click.UsageError(
+            f"'{bundle}' is a bundle and no trace: `firable replay TRACE --net {shlex.quote(bundle)}`"
+        )
     if of is None:
         raise click.UsageError("Missing option '--net': say which net, or which bundle, the trace is of")
     if output == "-":

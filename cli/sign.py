@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+
 import click
 
 from firable.cli.files import MADE, READ
@@ -21,14 +23,14 @@ def sign(bundle: str | None, key: str | None, make_key: str | None) -> int:
     """
     if bundle is not None and key is None and make_key is not None:
         raise click.UsageError(
-            f"--make-key makes a key and signs nothing with it: add `--key {make_key}` to sign {bundle}"
+            f"--make-key makes a key and signs nothing with it: add `--key {shlex.quote(make_key)}` to sign {bundle}"
         )
     if (bundle is None) != (key is None) or (bundle is None and make_key is None):
         raise click.UsageError("say which BUNDLE to sign, and with --key which key; --make-key FILE makes one")
     from firable.cli.options import refuse_a_net
 
     if bundle is not None:
-        refuse_a_net(bundle, "what is signed is a bundle", f"firable sign --key {key}")
+        refuse_a_net(bundle, "what is signed is a bundle", f"firable sign --key {shlex.quote(str(key))}")
     from firable.nets import signing
     from firable.nets.bundle import read_bundle
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
@@ -112,8 +113,9 @@ def takeover(
         if names:
             host = "".join(f" --controller {name}" for name in controllers[file]) if len(dealt) > 1 else ""
             host += " --coordinator" if len(dealt) > 1 and file in at_top else ""
+            target = shlex.quote(targets[file])
             with_what = "its links, and the binding" if len(dealt) > 1 else "the plant or binding"
-            click.echo(f"  next: firable run {new}{host} --journal {targets[file]}, with {with_what} of the cell")
+            click.echo(f"  next: firable run {shlex.quote(new)}{host} --journal {target}, with {with_what} of the cell")
         else:
             click.echo(f"  {targets[file]} is not written: '{after.net.name}' has none of the machines of that host")
     return 0

@@ -16,6 +16,7 @@ anew: what another program has written is not undone from here.
 from __future__ import annotations
 
 import asyncio
+import shlex
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -229,7 +230,8 @@ def editing_of(playing: Playing, argument: str, *, read_only: bool) -> Editing:
         hint = f"`firable convert {argument} -o {name}.firable.yaml` makes a file of it"
         return Editing(playing, None, f"a net of the catalogue is not edited: {hint}")
     if not isinstance(playing.loaded.positions, Positions):
-        hint = f"`firable convert {argument} -o {Path(argument).stem}.firable.yaml` makes a net file of it"
+        made = f"{Path(argument).stem}.firable.yaml"
+        hint = f"`firable convert {shlex.quote(argument)} -o {shlex.quote(made)}` makes a net file of it"
         return Editing(playing, None, f"only a net file is edited: {hint}")
     file = NetFile.read(argument)
     if not file.may_be_written():

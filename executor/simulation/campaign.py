@@ -9,6 +9,7 @@ choices that are left is no longer named by a seed, and would have to be kept as
 from __future__ import annotations
 
 import random
+import shlex
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
@@ -78,7 +79,7 @@ class Failed:
         """The command that brings the run back; `net` is the net as the command line names it."""
         kinds = "" if self.run.kinds is None else f" --faults {','.join(self.run.kinds) or 'none'}"
         steps = "" if self.run.steps is None else f" --steps {self.run.steps}"
-        return f"firable rehearse {net} --seed {self.run.seed}{kinds}{steps}"
+        return f"firable rehearse {shlex.quote(net)} --seed {self.run.seed}{kinds}{steps}"
 
 
 def rehearse(subject: Subject, run: Run, machines: Machines = REAL) -> Passed | Failed:
