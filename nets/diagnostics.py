@@ -228,9 +228,19 @@ class InputError(Exception):
 
 
 def did_you_mean(name: str, known: Sequence[str]) -> str:
-    """The start of a hint that names the closest known name, or nothing where none is close."""
+    """The start of a hint that names the closest known name, or nothing where none is close.
+
+    The same name under another owner is close, where one owner alone has it.
+
+    >>> did_you_mean("lathe.belt", ["conveyor.belt", "lathe.free"])
+    "did you mean 'conveyor.belt'? "
+    """
     from difflib import get_close_matches
 
+    owner, _, own = name.rpartition(".")
+    elsewhere = [one for one in known[:20_000] if one.endswith(f".{own}")] if owner else []
+    if len(elsewhere) == 1:
+        return f"did you mean '{elsewhere[0]}'? "
     # Comparing is slow where both are many or long: a hint is not worth a minute.
     known = [candidate for candidate in known if abs(len(candidate) - len(name)) <= 4][:2000] if len(name) <= 80 else []
     close = filter(partial(_is_slip, name), get_close_matches(name, known, n=5, cutoff=0.6))

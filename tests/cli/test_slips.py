@@ -1,7 +1,9 @@
 """A slip of the pen, wherever a name is written: the name that was probably meant is told."""
 
 import re
+import shlex
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
@@ -112,6 +114,13 @@ def test_a_name_that_is_like_another_by_its_owner_alone_is_no_slip_of_it() -> No
     assert did_you_mean("lathe.fere", ["lathe.free", "lathe.busy"]) == "did you mean 'lathe.free'? "
 
 
+def test_the_same_name_under_another_owner_is_told_where_one_alone_has_it() -> None:
+    assert did_you_mean("lathe.empty", ["lathe.free", "conveyor.empty"]) == "did you mean 'conveyor.empty'? "
+    assert did_you_mean("lathe.empty", ["conveyor.empty", "table.empty"]) == ""
+    assert did_you_mean("lathe.fre", ["lathe.free", "robot.free"]) == "did you mean 'lathe.free'? "
+    assert did_you_mean("empty", ["lathe.free", "robot.far"]) == ""
+
+
 @pytest.mark.parametrize(
     ("arguments", "meant"),
     [
@@ -130,3 +139,12 @@ def test_a_slip_on_the_command_line_is_told_too(
 ) -> None:
     assert main(arguments) == 2
     assert f"did you mean '{meant}'?" in capsys.readouterr().err
+
+
+def test_a_command_that_is_told_can_be_typed_as_it_stands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    net, runs, evidence = (str(tmp_path / name) for name in ("my cell.firable.yaml", "my runs", "my evidence"))
+    Path(net).write_text("firable: 1\ncell: c\nplaces: {a: , b: }\nstart: a\ntransitions: {t: {from: a, to: b}}\n")
+    assert main(["check", net, "--trace-dir", runs, "--evidence", evidence]) == 1
+    said = [shlex.split(found) for found in re.findall(r"firable ((?:replay|verify) .*)", capsys.readouterr().out)]
+    assert {words[0] for words in said} == {"replay", "verify"}
+    assert [main(words) for words in said] == [0] * len(said)
