@@ -350,7 +350,7 @@ def _wanted(kind: str, context: Mapping[str, Any], node: Node, path: Path) -> st
             return "a name or text is expected"
         case "list_type" if text and not is_word:  # a name for a list of one name is not taken here
             return "a list is expected: `[name, name]`"
-        case "list_type":
+        case "list_type" | "tuple_type":
             leave = f"; leave `{path[-1]}` out where there is none" if text == "" else ""
             return f"a name or a list of names is expected: `name` or `[name, name]`{leave}"
         case "int_type" if text.isdigit():

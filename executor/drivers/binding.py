@@ -25,6 +25,7 @@ from firable.executor.drivers.device import Bounded, DeviceKind, Divided, Option
 from firable.executor.drivers.kinds import kind_named
 from firable.executor.drivers.overlapping import overlaps
 from firable.nets.diagnostics import Diagnostic, InputError, did_you_mean
+from firable.nets.document import given
 from firable.nets.document_errors import Shape, document_problems, keys_of, version_problem
 from firable.nets.source import Source, printable, quoted, read_bytes, read_source
 from firable.nets.yaml_tree import Data, Node, data, node_span, nodes_along, parse_tree
@@ -38,9 +39,15 @@ ACKNOWLEDGED: Final = "acknowledged"
 """How the binding writes of a completion that no sensor has a part in it."""
 
 
+def _as_list(value: object) -> object:
+    return [value] if isinstance(value, str) else value
+
+
 Name = Annotated[str, Field(min_length=1)]
 Seconds = Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)]
 Grace = Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)]
+Controllers = Annotated[tuple[Name, ...] | None, BeforeValidator(lambda value: given(_as_list(value) or None))]
+"""One or several: a contact that is for none of them would stop nothing."""
 Writing = Annotated[str, BeforeValidator(lambda value: str(value).lower() if isinstance(value, bool) else value)]
 """A value as the file writes it; `writes` says what is meant."""
 
@@ -125,7 +132,7 @@ class EmergencyDocument(_Model):
     device: Name
     read: Name
     invert: bool = False
-    controllers: tuple[Name, ...] | None = None
+    controllers: Controllers = None
 
 
 class CommandDocument(_Model):

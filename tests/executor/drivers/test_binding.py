@@ -309,6 +309,8 @@ STOP = "emergency_stop:\n  door: {device: plc, read: discrete 3}\nsignals:"
         ("discrete 3", "coil x", ("F5102", "14: read")),
         ("read: discrete 3", "read: discrete 3, on_loss: hold", ("F1008", "14: door")),
         ("read: discrete 3", "read: discrete 3, controllers: [M, N]", ("F5101", "14: controllers")),
+        ("read: discrete 3", "read: discrete 3, controllers: []", ("F1010", "14: [")),
+        ("read: discrete 3", "read: discrete 3, controllers: ", ("F1010", "14: controllers")),
         ("{device: plc, read: discrete 3}", "{device: cloud, read: stop}", ("F5101", "17: device")),
     ],
 )
@@ -319,6 +321,12 @@ def test_a_contact_of_the_emergency_stop_that_would_stop_nothing_is_refused(
     if "cloud" in new:  # whose broker is there, and says nothing of the device
         stop = stop.replace("emergency_stop:", "  cloud:\n    driver: mqtt\n    host: broker\nemergency_stop:")
     assert found in refusal(edited("signals:", stop), fit=found == ("F5101", "14: controllers"))
+
+
+def test_a_contact_is_for_one_controller_by_its_name_alone() -> None:
+    stop = STOP.replace("discrete 3", "discrete 3, controllers: robot")
+    contact = parse_binding(edited("signals:", stop)).document.emergency_stop["door"]
+    assert contact.controllers == ("robot",)
 
 
 @pytest.mark.parametrize(
