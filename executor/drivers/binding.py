@@ -380,7 +380,7 @@ class _Reading:
             for point in command.write:
                 self.point(command.device, ("commands", place, "write", point), point, Use.WRITE)
             self.values(command.device, ("commands", place, "write"), command.write)
-        for path, message, hint in overlaps(self.document):
+        for path, message, hint in overlaps(self.document, self.is_one):
             self.problem("F5102", path, message, hint)
 
     def contact(self, name: str, contact: EmergencyDocument) -> None:

@@ -75,7 +75,7 @@ class _Modbus:
         except ValueError as error:
             return str(error)
         if use is Use.WRITE and found.table not in WRITTEN:
-            return f"nobody can write a {found.table} but the device"
+            return f"nobody can write {'an' if found.table[0] in 'aeiou' else 'a'} {found.table} but the device"
         return ""
 
     def value_problem(self, point: Point, value: Value) -> str:

@@ -1,5 +1,7 @@
 """Points of one device that would mean two things, such as a heartbeat at the register of a channel's number.
 
+Two devices of the binding that stand at one address are one: each command of either would be one of the other, too.
+
 Each is an address that the device has, so no kind of device objects to it, and the machines make of it what they like:
 with the heartbeat there, each beat is a command. Refused is
 
@@ -8,13 +10,15 @@ with the heartbeat there, each beat is a command. Refused is
 - an answer (*taken*, *done*, *failed*) at one point with another answer, or with what is written. Only the bits by
   which machines without numbers say that they have failed may be one, a common alarm.
 
-A signal may be read anywhere, and safe outputs may be any: to take a request back is one. Points are compared as they
-are written. Rejected: a warning, which nobody reads before the machine moves.
+A signal may be read anywhere, and safe outputs may be any: to take a request back is one. Two devices at one address
+may have one heartbeat (`sharing.py` says when not). Points are compared as they are written. Rejected: a warning, which
+nobody reads before the machine moves.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 from firable.executor.drivers.device import Point
@@ -26,20 +30,35 @@ if TYPE_CHECKING:
 Overlap = tuple[Path, str, str]
 """Where a point stands that has a meaning already, what both are, and what to do."""
 
+_HEARTBEAT: Final = "the heartbeat"
 _HINT: Final = "look up where the device has the second of them, and give it that address"
 
 
-def overlaps(document: BindingDocument) -> Iterator[Overlap]:
-    """The points of each device that have two meanings of which one would be taken for the other."""
+def overlaps(document: BindingDocument, is_one: Callable[[str, str], bool]) -> Iterator[Overlap]:
+    """The points of each device that have two meanings of which one would be taken for the other.
+
+    `is_one` tells of two devices whether they stand at one address.
+    """
+    apart: list[tuple[str, _Points]] = []
     for device in document.devices:
-        written: dict[Point, str] = {}
-        yield from _gives(document, device, written)
-        yield from _answers(document, device, written)
+        points = next((points for name, points in apart if is_one(name, device)), None)
+        if points is None:
+            apart.append((device, points := _Points()))
+        yield from _gives(document, device, points)
+        yield from _answers(document, device, points)
 
 
-def _gives(document: BindingDocument, device: str, written: dict[Point, str]) -> Iterator[Overlap]:
+@dataclass(frozen=True, slots=True)
+class _Points:
+    """What is at the points of a device: who has put each there, and what is written, or answered."""
+
+    written: dict[Point, tuple[str, str]] = field(default_factory=dict)
+    answers: dict[Point, tuple[str, str, bool]] = field(default_factory=dict)
+
+
+def _gives(document: BindingDocument, device: str, points: _Points) -> Iterator[Overlap]:
     """Of what gives commands, and of the heartbeat, those that are written where another is; they are put down."""
-    body = document.devices[device]
+    body, written = document.devices[device], points.written
     roles: list[tuple[Path, Point, str]] = [
         (("devices", device, "channels", name, key), point, f"the {key} of '{name}'")
         for name, channel in body.channels.items()
@@ -47,31 +66,33 @@ def _gives(document: BindingDocument, device: str, written: dict[Point, str]) ->
         if (point := getattr(channel, key)) is not None
     ]
     if body.heartbeat is not None:
-        roles.append((("devices", device, "heartbeat", "write"), body.heartbeat.write, "the heartbeat"))
+        roles.append((("devices", device, "heartbeat", "write"), body.heartbeat.write, _HEARTBEAT))
     for path, point, role in roles:
-        if point in written:
-            yield _two(path, device, point, written[point], role)
-        written.setdefault(point, role)
+        of, other = written.setdefault(point, (device, role))
+        if (of, other) != (device, role) and not (other == _HEARTBEAT and role == _HEARTBEAT):
+            yield _two(path, device, point, of, other, role)
     for place, command in document.commands.items():
         for point in command.write if command.device == device else ():
             if point in written:
                 role = f"what the command of '{place}' writes"
-                yield _two(("commands", place, "write", point), device, point, written[point], role)
+                yield _two(("commands", place, "write", point), device, point, *written[point], role)
 
 
-def _answers(document: BindingDocument, device: str, written: dict[Point, str]) -> Iterator[Overlap]:
+def _answers(document: BindingDocument, device: str, points: _Points) -> Iterator[Overlap]:
     """The answers of channels that stand where another answer does, or something that is written."""
-    answers: dict[Point, tuple[str, bool]] = {}
     for name, channel in document.devices[device].channels.items():
         for key in ("taken", "done", "failed"):
             if (point := getattr(channel, key)) is None:
                 continue
             role, may_be_common = f"'{key}' of '{name}'", key == "failed" and channel.request is not None
-            other, is_common = answers.get(point, (written.get(point, ""), False))
+            of, other, is_common = points.answers.get(point, (*points.written.get(point, ("", "")), False))
             if other and not (may_be_common and is_common):
-                yield _two(("devices", device, "channels", name, key), device, point, other, role)
-            answers.setdefault(point, (role, may_be_common))
+                yield _two(("devices", device, "channels", name, key), device, point, of, other, role)
+            points.answers.setdefault(point, (device, role, may_be_common))
 
 
-def _two(path: Path, device: str, point: Point, one: str, other: str) -> Overlap:
-    return path, f"'{point}' of '{device}' would be {one} and {other}", _HINT
+def _two(path: Path, device: str, point: Point, of: str, one: str, other: str) -> Overlap:
+    if of == device:
+        return path, f"'{point}' of '{device}' would be {one} and {other}", _HINT
+    message = f"'{point}' of '{device}', which stands at the address of '{of}', would be {one} there and {other}"
+    return path, message, f"{_HINT}; or correct the address of '{device}'"

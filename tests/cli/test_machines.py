@@ -235,7 +235,7 @@ def test_a_bundle_for_whose_loops_the_time_is_too_short_says_how_to_give_more(
     monkeypatch.setattr(bundling, "sealed_loops", late)
     assert main(["bundle", CELL, "-o", str(tmp_path / "cell.bundle"), "--machines", PLANT]) != 0
     told = capsys.readouterr()
-    assert "than the 30 s without it, with --max-seconds" in told.out + told.err
+    assert "allow more time to look for evidence, with --max-seconds; without it, that is 30 s" in told.out + told.err
 
 
 def test_the_time_of_an_obligation_is_that_of_the_loop_too(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -245,6 +245,31 @@ def test_a_point_that_would_mean_two_things_is_refused(old: str, new: str, place
     assert refusal(edited(old, new)) == [("F5102", place)]
 
 
+@pytest.mark.parametrize(
+    ("channel", "host", "keys"),
+    [
+        ("{number: holding 1}", "10.0.0.1", ["number"]),
+        ("{number: holding 0}", "10.0.0.1", ["number"]),
+        ("{number: holding 9, taken: input 1, done: input 2}", "10.0.0.1", ["taken", "done"]),
+        ("{number: holding 9, taken: input 3}", "10.0.0.1", []),
+        ("{number: holding 1, taken: input 1}", "10.0.0.2", []),
+    ],
+)
+def test_a_point_that_means_two_things_by_two_devices_at_one_address_is_refused(
+    channel: str, host: str, keys: list[str]
+) -> None:
+    heartbeat = "heartbeat: {write: holding 0, every_s: 1}"  # on one host two devices may have one
+    second = f"  again: {{driver: modbus-tcp, host: {host}, {heartbeat}, channels: {{O: {channel}}}}}\nsignals:"
+    text = edited("signals:", second)
+    try:
+        parse_binding(text)
+    except InputError as error:
+        found = [problem.subject[-1] for problem in error.diagnostics if problem.code == "F5102"]
+        assert found == keys
+    else:
+        assert not keys
+
+
 def test_a_common_alarm_of_machines_without_numbers_and_requests_among_the_safe_outputs_are_taken() -> None:
     text = edited("number: holding 1, taken: input 1, done: input 2", "request: coil 1, done: coil 2, failed: coil 4")
     parse_binding(text.replace("number: holding 5", "request: coil 5, done: coil 6, failed: coil 4"))
