@@ -44,7 +44,7 @@ SECONDS: Final = 30.0
 METHOD: Final = "shown by its evidence"
 """How each verdict on the net was found, as a bundle says it: what it tells besides is for `firable check` to say."""
 LATE: Final = "the time for evidence was over"
-_MORE: Final = f"allow more time to look for evidence than the {SECONDS:g} s without it, with --max-seconds"
+_MORE: Final = f"allow more time to look for evidence, with --max-seconds; without it, that is {SECONDS:g} s"
 
 
 class UnbundledError(InputError):
