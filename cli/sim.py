@@ -219,6 +219,7 @@ async def _serve(
             click.echo(f"the time is over: {len(plant.delivered)} carried out, {len(plant.inside)} inside")
         except asyncio.CancelledError:
             if not cell.fault:
+                click.echo(f"ended: {len(plant.delivered)} carried out, {len(plant.inside)} inside")
                 raise
         except GoneError as error:
             message, hint = f"the cell cannot be served any more: {error}", "the same command serves it anew"

@@ -412,8 +412,7 @@ class BoundDevice:
             if shows != self.driver.completions.shown[signal]:
                 self.driver.formed(signal, self.driver.completions.shows(signal, shows))
         if faults:
-            several = f"{faults[0]} and {len(faults) - 1} more" if len(faults) > 1 else faults[0]
-            self._fault(f"'{several}' cannot be read: {self.image.readings[faults[0]].why}")
+            self._fault(f"{_several(faults)} cannot be read: {self.image.readings[faults[0]].why}")
 
     def _replied(self, channel: Channel | Handshake, key: str, point: Point, value: Value) -> None:
         for outcome in channel.shows(key, value):
@@ -454,3 +453,12 @@ def _given(channel: Channel | Handshake, order: Order) -> str:
     """An order, and where it was written and would be shown."""
     shown = ", ".join(channel.points())
     return f"'{order.text}' of '{order.place}' (written at {channel.document.asks}, shown at {shown})"
+
+
+def _several(names: Sequence[str]) -> str:
+    """The first of some names, and how many there are besides.
+
+    >>> _several(["robot.touch"]), _several(["robot.touch", "mc.there"])
+    ("'robot.touch'", "'robot.touch' and 1 more")
+    """
+    return f"'{names[0]}'" + (f" and {len(names) - 1} more" if len(names) > 1 else "")

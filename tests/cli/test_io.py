@@ -235,7 +235,8 @@ def test_binding_by_hand_with_each_machine_behind_a_protocol_of_its_own_is_serve
         assert running.returncode == 0, said
     finally:
         serving.terminate()
-        serving.communicate(timeout=PATIENCE_SECONDS)
+        rest, _ = serving.communicate(timeout=PATIENCE_SECONDS)
+    assert "ended: 1 carried out, 0 inside" in rest
     assert [path for path in lines if path.is_symlink()] == []
 
 
