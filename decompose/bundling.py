@@ -16,6 +16,7 @@ from dataclasses import replace
 from typing import Final
 
 from firable.analysis.deadline import NEVER, Deadline
+from firable.analysis.evidence.producing.lacking import NO_TIME, is_of_size
 from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.goal import Limits
 from firable.analysis.report import CheckReport
@@ -43,7 +44,7 @@ SECONDS: Final = 30.0
 
 METHOD: Final = "shown by its evidence"
 """How each verdict on the net was found, as a bundle says it: what it tells besides is for `firable check` to say."""
-LATE: Final = "the time for evidence was over"
+_LESS: Final = "that is a limit of size, which no time moves: make it smaller, or ask for less by the property"
 _MORE: Final = f"allow more time to look for evidence, with --max-seconds; without it, that is {SECONDS:g} s"
 
 
@@ -101,9 +102,9 @@ def make_bundle(
     if faults:
         dead, last_rites = sealed_outages(decomposition, lambda: _anew(limits, seconds), timeout_ms)
         dead = tuple(replace(v, bound=UNDECIDED) if v.status is Status.UNKNOWN else v for v in dead)
-    held, machines = tuple[Verdict, ...](), dict[str, str]()
+    held, machines, unshown = tuple[Verdict, ...](), dict[str, str](), dict[str, str]()
     if plant:
-        held, machines = sealed_loops(decomposition, plant, lambda: _anew(limits, seconds))
+        held, machines, unshown = sealed_loops(decomposition, plant, lambda: _anew(limits, seconds))
     refined, opened = sealed(report.net, origin, _anew(limits, seconds), timeout_ms) if origin else ((), {})
     verdicts = (*on_the_net, *proof.verdicts, *run, *dead, *held, *voted, *refined)
     proofs = {**proof.files, **obligations, **last_rites}
@@ -111,7 +112,7 @@ def make_bundle(
     bundle = Bundle(decomposition, verdicts, files)
     if problems := (*unproved(bundle), *_given_up(proof)):
         lacking = {record.name: record.lacking for record in document.records if record.proved and record.lacking}
-        lacking |= {verdict.name: LATE for verdict in held if verdict.holds and not verdict.evidence}
+        lacking |= {v.name: unshown.get(v.name, NO_TIME) for v in held if v.holds and not v.evidence}
         loops = {verdict.name: verdict for verdict in held}
         raise UnbundledError((_unbundled(problem, lacking, loops) for problem in problems), verdicts)
     return bundle
@@ -173,7 +174,7 @@ def _unbundled(problem: Diagnostic, lacking: Mapping[str, str], loops: Mapping[s
     name = problem.subject[-1]
     if name in lacking:
         message = f"'{name}' is proved, and there is no evidence that shows it again: {lacking[name]}"
-        return replace(problem, code="F4003", message=message, hint=_MORE)
+        return replace(problem, code="F4003", message=message, hint=_LESS if is_of_size(lacking[name]) else _MORE)
     if name in loops:
         hint = "; ".join(filter(None, (problem.hint, seen_by(loops[name]))))
         return replace(problem, code="F4003", hint=hint)

@@ -43,10 +43,11 @@ UNDECIDED: Final = "not decided within the limits"
 
 def sealed_loops(
     decomposition: Decomposition, plant: str, limits: Callable[[], Limits]
-) -> tuple[tuple[Verdict, ...], dict[str, str]]:
+) -> tuple[tuple[Verdict, ...], dict[str, str], dict[str, str]]:
     """The verdicts on a net with the machines of a plant file, given as its text, and the files that they name.
 
-    `limits` are those of each document. A verdict of which a part is not shown names no evidence. Raises `InputError`
+    `limits` are those of each document. A verdict of which a part is not shown names no evidence, and the third that is
+    returned tells by its name why. Raises `InputError`
     as `close` does, and as `check` does, and F4003 where a loop could not be held against the plant file again.
     """
     net, model = decomposition.net, parse_plant(plant)
@@ -61,7 +62,7 @@ def sealed_loops(
     for file, asked in ((FAILING, faults.for_good), (REPAIRED, faults.repaired)):
         if asked is not None:
             sealing.add(file, asked, asked.verdicts)
-    return tuple(sealing.verdicts), sealing.files
+    return tuple(sealing.verdicts), sealing.files, sealing.lacking
 
 
 def _see_compared(net: Net, model: PlantModel) -> None:
@@ -89,6 +90,7 @@ class _Sealing:
         self.method = f"closed loop with the machines of the plant {sha256(plant.encode()).hexdigest()}"
         self.verdicts: list[Verdict] = []
         self.files = {PLANT: plant}
+        self.lacking: dict[str, str] = {}
 
     def add(self, file: str, asked: Answered, told: Sequence[Verdict]) -> dict[str, list[str]]:
         """Add the document on a loop, and its verdicts; for each of what its violation is shown."""
@@ -98,6 +100,9 @@ class _Sealing:
         for family, verdict in zip(asked.families, told, strict=True):
             unproved = verdict.weight is Weight.REQUIRED and not verdict.holds
             self.verdicts.append(verdict if unproved else _as_shown(family, records, file, self.method))
+            of = filter(None, (records.get(f"property.{prop.name}") for prop in family.of.values()))
+            if (why := next((record.lacking for record in of if record.lacking), "")) and not unproved:
+                self.lacking[family.name] = why
         return {family.name: _shown_to_fail(family, records) for family in asked.families}
 
 

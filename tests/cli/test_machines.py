@@ -11,6 +11,7 @@ import jsonschema
 import pytest
 
 from firable.analysis.deadline import Deadline
+from firable.analysis.evidence.producing import spaces
 from firable.analysis.goal import Limits
 from firable.analysis.spaces.reachability import Budget
 from firable.cli.main import main
@@ -236,6 +237,20 @@ def test_a_bundle_for_whose_loops_the_time_is_too_short_says_how_to_give_more(
     assert main(["bundle", CELL, "-o", str(tmp_path / "cell.bundle"), "--machines", PLANT]) != 0
     told = capsys.readouterr()
     assert "allow more time to look for evidence, with --max-seconds; without it, that is 30 s" in told.out + told.err
+
+
+def test_a_bundle_that_is_kept_back_by_how_many_markings_are_written_down_is_not_told_to_take_more_time(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(spaces, "MARKINGS_MAX", 500)  # those of the loop are 903
+    monkeypatch.setattr(spaces, "WIDE_MAX", 500)
+    assert main(["bundle", CELL, "-o", str(tmp_path / "cell.bundle"), "--machines", PLANT]) == 2
+    told = capsys.readouterr().err
+    assert (
+        "'loop.property.accepted_is_carried_out' is proved, and there is no evidence that shows it again: ranks for"
+        in told
+    )
+    assert "that is a limit of size, which no time moves" in told
 
 
 def test_the_time_of_an_obligation_is_that_of_the_loop_too(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -362,7 +362,7 @@ transitions:
 def test_what_rests_on_a_loss_that_could_not_be_checked_in_time_is_only_claimed() -> None:
     net = parse_net(STARTS)
     decomposition = split(net)
-    verdicts, files = sealed_loops(decomposition, BENCH, Limits)
+    verdicts, files, _ = sealed_loops(decomposition, BENCH, Limits)
     assert [v.subjects for v in verdicts if v.name == "loop.live"] == [("warm",)]
     cut, examination = Cut(net), Examination(Bundle(decomposition, verdicts, files))
     check_machines(examination, cut, answered, TIMEOUT_MS)
