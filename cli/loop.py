@@ -110,6 +110,7 @@ def loop_report(
         verdicts,
         discipline="interleaving",
         notes=(*loaded.notes, *late_limits(model, loaded.net)),
+        course=report.closed.course,
         files=files,
         loop_net=report.loop.net,
         positions=loaded.positions,
@@ -152,6 +153,9 @@ def show_loop(report: Report, *, verbose: bool) -> None:
     whole = "" if loop["complete"] else " so far"
     click.echo(f"  the loop has {', '.join(text.counted(n, word) for n, word in counts)} and {edges}{whole}")
     click.echo(f"  {text.counted(loop['markings_gates_free'], 'marking')} with gates free")
+    if verbose or len(report.course) > 1:
+        for line in report.course:
+            click.echo(f"  {line}")
     rows = loop["comparison"]
     width = max((len(row["question"]) for row in rows), default=12)
     click.echo(f"\n{click.style('side by side', bold=True)}{' ' * (width - 6)}gates free  with its machines")

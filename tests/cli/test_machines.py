@@ -239,6 +239,14 @@ def test_a_bundle_for_whose_loops_the_time_is_too_short_says_how_to_give_more(
     assert "allow more time to look for evidence, with --max-seconds; without it, that is 30 s" in told.out + told.err
 
 
+def test_what_was_tried_where_the_first_markings_are_not_all_is_told_of_a_loop_too(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("firable.analysis.check.FIRST_MARKINGS", 200)
+    assert main(["check", CELL, "--machines", PLANT]) == 0
+    assert "\n  the first 200 markings are not all\n" in capsys.readouterr().out
+
+
 def test_a_bundle_that_is_kept_back_by_how_many_markings_are_written_down_is_not_told_to_take_more_time(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
