@@ -98,7 +98,7 @@ def _if_not_reported(tell: Callable[[str, str], None], kind: str, sentence: str)
 
 def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, ...]:
     from firable.executor import State
-    from firable.nets.verdict import Status, Verdict
+    from firable.nets.verdict import Status, Verdict, counted
 
     method = f"run on the simulated cell, seed {seed}"
     through = len(report.delivered)
@@ -114,7 +114,7 @@ def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, .
         Verdict(
             "workpieces-carried-through",
             ended,
-            f"{workpieces} workpieces go through the cell",
+            f"{counted(workpieces, 'workpiece')} {'goes' if workpieces == 1 else 'go'} through the cell",
             method,
             bound=reached if ended is Status.UNKNOWN else "",
             subjects=(*_why(report), *map(str, report.situation.blocked)) if ended is Status.VIOLATED else (),

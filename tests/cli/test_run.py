@@ -373,6 +373,7 @@ def test_the_end_of_a_run_by_a_fault_tells_the_fault_once_and_what_to_do() -> No
     situation = Situation(State.FAULT, (), message=fault)
     report = RunReport(situation, (), (), (), (), {}, 0, 0, {}, 1.0)
     simulated = _verdicts(report, 1, 0)[0]
+    assert simulated.statement == "1 workpiece goes through the cell"
     for one in (simulated, bound_run._verdict(report, "cell.bind.yaml"), hosting._verdict(situation, ("robot",))):
         assert one.status is Status.VIOLATED
         assert one.subjects == (fault,)
