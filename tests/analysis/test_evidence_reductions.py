@@ -30,7 +30,10 @@ from firable.analysis.evidence.checking.checker import check_document, check_evi
 from firable.analysis.evidence.checking.obligation import Evidence
 from firable.analysis.evidence.checking.reductions import Draft
 from firable.analysis.evidence.claims import Claim, ClaimKind
-from firable.analysis.evidence.refusal import TimeIsOverError
+from firable.analysis.evidence.producing.lacking import LackingError
+from firable.analysis.evidence.producing.reductions import reduction
+from firable.analysis.evidence.refusal import TimeIsOverError, refuse
+from firable.analysis.goal import Limits
 from firable.nets.catalogue.families import family_net
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import Deadlock, Firable, parse_formula
@@ -287,3 +290,23 @@ def test_a_transition_is_dead_whose_only_need_never_holds() -> None:
     draft.apply(Step(Rule.FACTS))
     draft.apply(Step(Rule.DEAD, (1, 2)))
     assert list(draft.moves) == [0]
+
+
+def test_a_goal_that_copies_make_always_true_wants_nothing() -> None:
+    # q is the complement of p, so (p or q) always holds: the steps that follow say so, and the checker follows them
+    net, goal = net_of("p", "t: p -> q", "u: q -> p"), parse_formula("deadlock and (p or q)")
+    found = reduction(net, goal, Limits(), lambda *_: None)
+    assert found is not None
+    assert Rule.EARLY in {step.rule for step in found.steps}
+    assert check_evidence(Evidence(net, Discipline.INTERLEAVING, Claim(ClaimKind.NEVER, goal), found)).shown
+
+
+def test_steps_that_the_checker_refuses_are_no_evidence_even_where_they_decide_the_goal(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def refused(_draft: Draft, step: Step) -> None:
+        refuse(f"the rule '{step.rule}' cannot be applied")
+
+    monkeypatch.setattr(Draft, "apply", refused)
+    with pytest.raises(LackingError):
+        reduction(net_of("p", "t: p -> q", "u: q -> p"), Deadlock(), Limits(), lambda *_: None)

@@ -65,7 +65,7 @@ move is a formula for each composed move, and these multiply where the rules com
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -84,16 +84,31 @@ from firable.semantics.formulas import evaluate
 
 @dataclass(frozen=True)
 class _Goals(TimedTerms):
-    """Terms in which a conjunction of contradictory literals is false: the goal wants nothing of it."""
+    """Terms in which a conjunction of contradictory terms is false, and a disjunction of them true.
+
+    Of either the goal wants nothing, however places stand for each other by now.
+    """
 
     def conjunction(self, operands: Iterable[Term], /) -> Term:
         """The AND of the operands, flat."""
-        flat: dict[Term, None] = {}
-        for one in operands:
-            flat.update(dict.fromkeys(one.operands if one.operator is Operator.AND else (one,)))
-        if any(one.operator is Operator.NOT and one.operands[0] in flat for one in flat):
-            return self.false
-        return super().conjunction(flat)
+        flat = _flat(Operator.AND, operands)
+        return self.false if _contradict(flat) else super().conjunction(flat)
+
+    def disjunction(self, operands: Iterable[Term], /) -> Term:
+        """The OR of the operands, flat."""
+        flat = _flat(Operator.OR, operands)
+        return self.true if _contradict(flat) else super().disjunction(flat)
+
+
+def _flat(operator: Operator, operands: Iterable[Term]) -> dict[Term, None]:
+    flat: dict[Term, None] = {}
+    for one in operands:
+        flat.update(dict.fromkeys(one.operands if one.operator is operator else (one,)))
+    return flat
+
+
+def _contradict(terms: Mapping[Term, None]) -> bool:
+    return any(one.operator is Operator.NOT and one.operands[0] in terms for one in terms)
 
 
 class Draft:

@@ -34,12 +34,14 @@ def reduction(
     `LackingError` where the checker does not follow.
     """
     reduced = reduce_for_goal(net, goal, limits)
-    if isinstance(reduced.goal, Constant):
-        return None if reduced.goal.value else Reduction(reduced.steps)
+    if reduced.goal == Constant(value=True):
+        return None
     draft = Draft(net, goal, limits.deadline)
     try:
         for step in reduced.steps:
             draft.apply(step)
+        if reduced.goal == Constant(value=False):
+            return Reduction(reduced.steps)
         for part, of in parts(reduced.net, reduced.goal):
             names = tuple(place.name for place in part.places)
             small, left = small_net(draft, map(net.place_index.__getitem__, names)), _without_deadlock(of)
