@@ -316,6 +316,8 @@ def _transition_problems(transition: Transition, known: _Known) -> Iterator[Diag
                 yield unknown
             elif name not in signals:
                 yield unknown_name("F2021", "place or signal", name, places | signals, subject)
+            else:
+                raise ValueError(f"the internal gate '{name}' of '{transition.name}' is a signal: its gate is external")
     seen_gates: set[ExternalGate] = set()
     for gate in transition.external:
         subject = ("transitions", transition.name, "if" if gate.wanted else "unless", gate.signal)

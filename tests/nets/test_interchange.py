@@ -114,6 +114,7 @@ TEMPORAL = {"name": "x", "kind": "ctl", "formula": "EF start", "then": None, "fa
         (("properties", 0, "kind"), "sometimes", "F1015"),
         (("transitions", 0, "inputs"), ["nowhere"], "F2002"),
         (("transitions", 1, "external"), [], "F1015"),
+        (("transitions", 0, "permissive"), ["robot.touch"], "F1015"),
     ],
 )
 def test_what_is_no_net_is_refused(path: tuple[Any, ...], value: Any, code: str) -> None:

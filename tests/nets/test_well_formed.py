@@ -58,5 +58,13 @@ def test_a_completion_that_gates_nothing_is_the_fault_of_a_program() -> None:
         Net("n", (Place("p", command=SEND, completion="done"),), (Transition("t", ("p",)),), (DONE,))
 
 
+@pytest.mark.parametrize(
+    "gated", [Transition("t", ("p",), permissive=("s",)), Transition("t", ("p",), inhibitive=("s",))]
+)
+def test_a_signal_as_an_internal_gate_is_the_fault_of_a_program(gated: Transition) -> None:
+    with pytest.raises(ValueError, match="its gate is external"):
+        Net("n", (Place("p"),), (gated,), (Signal("s"),))
+
+
 def test_a_net_without_a_broken_rule_has_no_problems() -> None:
     assert list(problems(Net("n", (Place("a.p", "a"),), (Transition("t", ("a.p",)),), controllers=(A,)))) == []
