@@ -376,6 +376,25 @@ def format_count(count: Count) -> str:
     return f"tokens({', '.join(count.places)}){f' + {count.added}' if count.added else ''}"
 
 
+def conjuncts(formula: Formula) -> Iterator[Formula]:
+    """The formulas that a formula is the conjunction of, negations pushed inwards as far as there is one.
+
+    >>> [format_formula(one) for one in conjuncts(Not(parse_formula("deadlock -> a and b")))]
+    ['deadlock', 'not (a and b)']
+    """
+    match formula:
+        case And(operands):
+            for operand in operands:
+                yield from conjuncts(operand)
+        case Not(Or(operands)):
+            for operand in operands:
+                yield from conjuncts(Not(operand))
+        case Not(Not(operand)):
+            yield from conjuncts(operand)
+        case _:
+            yield formula
+
+
 def names_in(formula: Formula) -> Iterator[Holds | Firable]:
     """The atoms of the formula that name a place or a transition, left to right."""
     match formula:

@@ -29,6 +29,7 @@ from firable.nets.formula import (
     Or,
     Sign,
     Start,
+    conjuncts,
 )
 from firable.nets.net import Net
 
@@ -60,7 +61,7 @@ def goal_of(net: Net, formula: Formula) -> Goal:
     >>> goal_of(net, Firable("t"))
     Goal(formula=And(operands=(Holds(place='p'), Not(operand=Holds(place='q')))), deadlock=False)
     """
-    operands = formula.operands if isinstance(formula, And) else (formula,)
+    operands = tuple(conjuncts(formula))
     rest = tuple(operand for operand in operands if operand != Deadlock())
     return Goal(rewritten(written_out(net, And(rest)), {}), len(rest) < len(operands))
 

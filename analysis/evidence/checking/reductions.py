@@ -77,7 +77,7 @@ from firable.analysis.evidence.checking.facts import Facts, Literal, Move, facts
 from firable.analysis.evidence.checking.obligation import TimedTerms
 from firable.analysis.evidence.refusal import TimeIsOverError, refuse
 from firable.analysis.induction.smt import Operator, Term
-from firable.nets.formula import And, Deadlock, Formula
+from firable.nets.formula import And, Deadlock, Formula, conjuncts
 from firable.nets.net import Net
 from firable.semantics.formulas import evaluate
 
@@ -116,7 +116,7 @@ class Draft:
 
     def __init__(self, net: Net, goal: Formula, deadline: Deadline) -> None:
         self.net, self.deadline = net, deadline
-        operands = goal.operands if isinstance(goal, And) else (goal,)
+        operands = tuple(conjuncts(goal))
         self.deadlock = Deadlock() in operands
         self.formula = And(tuple(one for one in operands if one != Deadlock()))
         self.never_dead = False

@@ -74,3 +74,11 @@ def test_only_a_deadlock_in_conjunction_is_kept_as_such() -> None:
     assert not goal_of(NET, parse_formula("not deadlock")).deadlock
     assert goal_of(NET, Deadlock()).as_formula() == Deadlock()
     assert goal_of(NET, parse_formula("deadlock and a and not a")).as_formula() == Constant(value=False)
+
+
+def test_a_deadlock_is_seen_under_negations_as_queries_bring_them() -> None:
+    # "AG not deadlock" and "AG (deadlock -> c)" come as goals with a negation around them
+    for text, left in (("not not deadlock", "true"), ("not (deadlock -> c)", "not c")):
+        goal = goal_of(NET, parse_formula(text))
+        assert goal.deadlock, text
+        assert goal.formula == parse_formula(left), text
