@@ -12,6 +12,7 @@ from firable.decompose.proofs.deciders import deciders
 from firable.decompose.proofs.proving import prove
 from firable.decompose.proofs.sides import Sides
 from firable.decompose.protocol.exploring import explore_protocol
+from firable.decompose.protocol.outages import outages
 from firable.decompose.protocol.parametric.side_conditions import side_conditions
 from firable.decompose.splitting.cut import split
 from firable.decompose.splitting.hypergraph import hypergraph
@@ -63,6 +64,17 @@ def test_a_fault_transition_is_left_to_its_controller_where_the_completion_is_wa
     timed = split(catalogue_net("one_robot_timed"))
     assert not any(name.endswith("_timeout") for name in coordinated(timed))
     assert {"t1-e", "t1-f", "t1-g", "t1-h", "t1-i"} <= coordinated(timed), "each competes with a global one"
+
+
+def test_a_timeout_into_a_place_that_is_filled_together_is_decided_with_that_and_dies_with_the_coordinator() -> None:
+    filled = HANDOVER.replace(
+        "use: {from: b.has, to: b.idle}", "drop: {from: [a.free, b.has], to: [a.go_fault, b.idle]}"
+    )
+    decomposition = split(parse_net(filled))
+    assert "a.go_timeout" in coordinated(decomposition)
+    assert prove(decomposition).holds
+    (dead,) = (outage for outage in outages(decomposition) if outage.coordinator)
+    assert "a.go_timeout" in dead.at_once
 
 
 def test_nothing_is_assumed_of_the_machines_for_a_timeout() -> None:
