@@ -300,3 +300,13 @@ def ring(n: int) -> Net:
     """One token that goes round so many places."""
     places = tuple(Place(f"p{i}", marked=i == 0) for i in range(n))
     return Net("ring", places, tuple(Transition(f"t{i}", (f"p{i}",), (f"p{(i + 1) % n}",)) for i in range(n)))
+
+
+def test_searches_for_something_smaller_share_one_part_of_the_time_where_all_markings_are_held() -> None:
+    """Else each of many claims takes its part, and nothing is left for those that only the markings show."""
+    net, limits = family_net("philosophers-4"), Limits(Deadline.after(1000))
+    held = producing.Spaces(net, Discipline.INTERLEAVING, limits, explore(net))
+    first, second = (held.part_of_a_search(1.0).at_seconds for _ in range(2))
+    assert first == second < limits.deadline.at_seconds - 700
+    alone = producing.Spaces(net, Discipline.INTERLEAVING, limits)
+    assert alone.part_of_a_search(1.0).at_seconds > limits.deadline.at_seconds - 700

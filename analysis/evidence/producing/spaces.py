@@ -46,14 +46,21 @@ class Spaces:
 
     def part(self, share: float) -> Deadline:
         """A part of the time that is left for evidence."""
-        left = self.limits.deadline.left_seconds
-        return self.limits.deadline.within(_SECONDS if left is None else left * share)
+        return _part_of(self.limits.deadline, share)
+
+    @cached_property
+    def _are_held(self) -> bool:
+        """Whether all markings are at hand, and may be listed."""
+        graph = self.given
+        return isinstance(graph, ReachabilityGraph) and graph.complete and graph.n_markings <= MANY_MAX
+
+    @cached_property
+    def _for_less(self) -> Deadline:
+        return self.part(0.25)
 
     def part_of_a_search(self, share: float) -> Deadline:
-        """The same for something smaller than all markings: less of it where these are at hand, and may be listed."""
-        graph = self.given
-        held = isinstance(graph, ReachabilityGraph) and graph.complete and graph.n_markings <= MANY_MAX
-        return self.part(share / 4 if held else share)
+        """The same for something smaller than all markings; where these are held, all searches share a part of it."""
+        return _part_of(self._for_less, share) if self._are_held else self.part(share)
 
     @cached_property
     def graph(self) -> ReachabilityGraph | None:
@@ -118,9 +125,9 @@ class Spaces:
         if isinstance(self.given, SymbolicSpace):
             return self.given.until(self.limits.deadline)
         try:
-            return explore_symbolically(self.net, Limits(self.part_of_a_search(0.3), self.limits.memory_bytes)).until(
-                self.limits.deadline
-            )
+            share = 0.08 if self._are_held else 0.3
+            space = explore_symbolically(self.net, Limits(self.part(share), self.limits.memory_bytes))
+            return space.until(self.limits.deadline)
         except BudgetExceeded:
             return None
 
@@ -140,3 +147,8 @@ class Spaces:
     def way_to(self, marking: Marking) -> Witness | None:
         """A way to one marking."""
         return self.way(lambda space: space.satisfying(is_marking(space.net, marking)))
+
+
+def _part_of(deadline: Deadline, share: float) -> Deadline:
+    left = deadline.left_seconds
+    return deadline.within(_SECONDS if left is None else left * share)
