@@ -20,15 +20,13 @@ pub(super) struct Racer {
     pub(super) before: u32,
     /// Whether it has run since twins were last looked for, and not waited.
     pub(super) ran: bool,
-    /// For how many rounds in succession it has stood where one before it stands.
-    pub(super) alike: u32,
     /// The results that it may still compute in this round; none where it waits, or has had its turn.
     pub(super) fuel: u64,
 }
 
 impl Racer {
     pub(super) fn new(order: Order) -> Self {
-        Racer { order, is_shortest: false, spared: false, begun: None, before: 0, ran: false, alike: 0, fuel: 0 }
+        Racer { order, is_shortest: false, spared: false, begun: None, before: 0, ran: false, fuel: 0 }
     }
 
     /// Whether its order is the one that the net came in, from either end.

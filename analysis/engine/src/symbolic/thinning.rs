@@ -10,8 +10,10 @@
 //!
 //! The candidates come as an order and its reverse. Where the direction matters, it soon shows, and then it is everything;
 //! where it does not, the two are *twins*: the net looks the same from both ends, and one search says what the other
-//! would. Two ways to lay a ring out are twins as well. So where two stand at the same level with as many nodes after two
-//! rounds in succession, the second drops out.
+//! would. Two ways to lay a ring out are twins as well, and so are two orders that have other places of the same block
+//! above: the search goes by blocks, so it fires the same, and in one of them more nodes say what it finds. So where two
+//! stand at the same level after as many firings, the one with more nodes drops out. The rejected alternative, to go by
+//! the nodes, takes two rounds to be sure, and keeps orders that differ in nothing but them.
 
 use super::racer::Racer;
 
@@ -20,9 +22,8 @@ const SPARED_ROUNDS: u32 = 2;
 /// The searches that run to the end.
 pub(super) const FINALISTS: usize = 2;
 
-/// Twins differ in their nodes by at most one in so many, after so many rounds.
-const TWINS_APART: usize = 12;
-const ROUNDS_ALIKE: u32 = 2;
+/// Twins differ in their firings by at most one in so many.
+const TWINS_APART: u64 = 256;
 
 /// Keeps half of the field: in turn who has the fewest rounds to go at the pace of the last one, who has come farthest,
 /// and who has the fewest nodes for it. None of the three alone tells who wins. Of the last two, the first by pace leads,
@@ -69,24 +70,29 @@ pub(super) fn running(field: &[Racer]) -> usize {
     field.iter().filter(|racer| !racer.spared).count()
 }
 
-/// Whether two searches, both begun, stand at the same level with about as many nodes.
-fn stand_alike(one: &Racer, other: &Racer) -> bool {
-    let ((level, nodes), (other_level, other_nodes)) = (one.standing(), other.standing());
-    let begun = one.begun.is_some() && other.begun.is_some();
-    begun && level == other_level && nodes.abs_diff(other_nodes) <= nodes.max(other_nodes) / TWINS_APART
+/// Whether two searches, which have both run, stand at the same level after about as many firings.
+fn are_twins(one: &Racer, other: &Racer) -> bool {
+    let firings = |racer: &Racer| racer.begun.as_ref().map(|(_, search, _)| search.fired());
+    let (Some(own), Some(others)) = (firings(one), firings(other)) else { return false };
+    one.ran
+        && other.ran
+        && one.standing().0 == other.standing().0
+        && own.abs_diff(others) <= own.max(others) / TWINS_APART
 }
 
-/// Takes out the second of each two that have been twins for long enough, but none of the shortest order for another one.
-/// Of two that wait, standing still says nothing.
+/// Takes out of each two twins the one with more nodes, but none of the shortest order for another one, nor one that runs
+/// for the first places for one beside. Of two that wait, standing still says nothing.
 pub(super) fn drop_twins(field: &mut Vec<Racer>) {
-    for at in (1..field.len()).rev() {
-        if !field[at].ran {
-            continue;
-        }
-        let may_go = |first: &Racer| first.ran && (first.is_shortest || !field[at].is_shortest);
-        let alike = field[..at].iter().any(|first| may_go(first) && stand_alike(first, &field[at]));
-        field[at].alike = if alike { field[at].alike + 1 } else { 0 };
-        if field[at].alike >= ROUNDS_ALIKE && field.len() > FINALISTS {
+    for at in (0..field.len()).rev() {
+        let racer = &field[at];
+        let nodes = racer.standing().1;
+        let does = |(beside, other): (usize, &Racer)| {
+            (other.standing().1, beside) < (nodes, at)
+                && (other.is_shortest || !racer.is_shortest)
+                && (racer.spared || !other.spared)
+                && are_twins(other, racer)
+        };
+        if field.len() > FINALISTS && field.iter().enumerate().any(does) {
             field.remove(at);
         }
     }
@@ -99,6 +105,7 @@ mod tests {
     use super::*;
     use crate::budget::{Watch, unwatched};
     use crate::net::Transition;
+    use crate::samples::slotted_ring;
 
     const ROOM: usize = 1 << 26;
     /// Results that bring a search some of the way along the ring, a little farther, and far.
@@ -135,22 +142,45 @@ mod tests {
     }
 
     #[test]
-    fn of_two_orders_that_stand_alike_twice_the_second_drops_out() {
+    fn of_two_orders_that_stand_alike_the_second_drops_out() {
         let [along, back, across, _] = orders();
         let (mut racers, transitions) = field(&[along.clone(), back, across.clone()]);
-        round(&mut racers, &transitions, |_| 200);
-        assert_eq!(racers.len(), 3);
         round(&mut racers, &transitions, |_| 400);
         assert_eq!(racers.iter().map(|racer| &racer.order).collect::<Vec<_>>(), [&along, &across]);
     }
 
     #[test]
+    fn of_twins_the_one_with_fewer_nodes_stays_wherever_it_stands() {
+        // In each block the places of one machine stand below those of the other, or among them.
+        let net = slotted_ring(40);
+        let order = |block: [u32; 8]| (0..40).flat_map(|node| block.map(|at| 8 * node + at)).collect::<Order>();
+        let (apart, mixed) = (order([4, 5, 6, 7, 2, 3, 1, 0]), order([0, 1, 2, 3, 4, 5, 6, 7]));
+        let back: Order = mixed.iter().rev().copied().collect();
+        let marked: Vec<u32> = (0..40).flat_map(|node| [8 * node + 2, 8 * node + 4]).collect();
+        for orders in [[&apart, &mixed, &back], [&mixed, &apart, &back]] {
+            let mut racers: Vec<Racer> = orders.into_iter().cloned().map(Racer::new).collect();
+            for racer in &mut racers {
+                let mut poll = unwatched;
+                racer.fuel = 30_000;
+                let ended = racer.run(&net.transitions, &marked, ROOM, &mut Watch::new(None, &mut poll));
+                assert_eq!(ended, Ok(None));
+            }
+            drop_twins(&mut racers);
+            assert_eq!(racers.iter().map(|racer| &racer.order).collect::<Vec<_>>(), [&apart, &back]);
+        }
+    }
+
+    #[test]
     fn of_two_that_wait_standing_still_makes_no_twins() {
         let [along, back, across, _] = orders();
-        let (mut racers, transitions) = field(&[along, back, across]);
-        round(&mut racers, &transitions, |_| 200);
+        let (mut racers, transitions) = field(&[along, back]);
+        round(&mut racers, &transitions, |_| 200); // the last two stay
+        racers.push(Racer::new(across));
         drop_twins(&mut racers);
-        assert_eq!((racers.len(), racers[1].alike), (3, 1));
+        assert_eq!(racers.len(), 3);
+        racers.iter_mut().for_each(|racer| racer.ran = true);
+        drop_twins(&mut racers);
+        assert_eq!(racers.len(), 2);
     }
 
     #[test]
@@ -215,7 +245,7 @@ mod tests {
         let (mut racers, transitions) = field(&[across, crossed, other.clone(), other, along.clone(), back.clone()]);
         // The last two have not begun, so that they are last by every measure.
         let own = racers.split_off(4);
-        round(&mut racers, &transitions, |_| 400);
+        round(&mut racers, &transitions, |at| 400 + 100 * at as u64); // so that none are twins
         racers.extend(own);
         for (thinned, left) in [(1, 5), (2, 4), (3, 2)] {
             assert_eq!((thin_out(&mut racers, thinned), racers.len()), (thinned == 3, left));
