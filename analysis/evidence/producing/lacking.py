@@ -15,7 +15,7 @@ class LackingError(Exception):
 def is_of_size(reason: str) -> bool:
     """Whether a reason is a limit of how many markings are written down, which more time does not move.
 
-    >>> is_of_size("ranks for a response are written for up to 100,000 markings"), is_of_size(NO_TIME)
+    >>> is_of_size("ranks for a response are written for up to 250,000 markings"), is_of_size(NO_TIME)
     (True, False)
     """
     return re.search("[0-9] markings$", reason) is not None

@@ -27,7 +27,7 @@ from firable.semantics.trace import Discipline
 
 MARKINGS_MAX: Final = 20_000
 """How many markings are listed where a decision diagram would do as well."""
-WIDE_MAX: Final = 100_000
+WIDE_MAX: Final = 250_000
 """How many markings are listed where none would: for responses, LTL, synchronous steps."""
 MANY_MAX: Final = 2_000_000
 """How many markings are listed where no diagram is at hand, and they are looked through in arrays."""
