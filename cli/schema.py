@@ -11,10 +11,10 @@ import click
 from firable.cli.choice import OneOf
 
 
-@click.command(short_help="Print the JSON Schema of net, task, plant and layout files, or of what is printed.")
-@click.argument("kind", type=OneOf(["net", "tasks", "plant", "layout", "report", "io"]))
+@click.command(short_help="Print the JSON Schema of net, task, plant, layout and binding files, or of what is printed.")
+@click.argument("kind", type=OneOf(["net", "tasks", "plant", "layout", "bind", "report", "io"]))
 def schema(kind: str) -> int:
-    """Print the JSON Schema of a net, task, plant or layout file, or of what --format json prints.
+    """Print the JSON Schema of a net, task, plant or layout file, of a binding, or of what --format json prints.
 
     `report` is what most commands print, `io` a line of `firable io`.
 

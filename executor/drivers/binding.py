@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Final, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, WithJsonSchema
 
 from firable.executor.drivers.device import Bounded, DeviceKind, Divided, Options, Point, Use, Value, Writes, files_of
 from firable.executor.drivers.kinds import kind_named
@@ -46,9 +46,20 @@ def _as_list(value: object) -> object:
 Name = Annotated[str, Field(min_length=1)]
 Seconds = Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)]
 Grace = Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)]
-Controllers = Annotated[tuple[Name, ...] | None, BeforeValidator(lambda value: given(_as_list(value) or None))]
+Controllers = Annotated[
+    tuple[Name, ...] | None,
+    BeforeValidator(
+        lambda value: given(_as_list(value) or None),
+        json_schema_input_type=Name | Annotated[list[Name], Field(min_length=1)],
+    ),
+]
 """One or several: a contact that is for none of them would stop nothing."""
-Writing = Annotated[str, BeforeValidator(lambda value: str(value).lower() if isinstance(value, bool) else value)]
+Writing = Annotated[
+    str,
+    BeforeValidator(
+        lambda value: str(value).lower() if isinstance(value, bool) else value, json_schema_input_type=Value
+    ),
+]
 """A value as the file writes it; `writes` says what is meant."""
 
 
@@ -118,7 +129,7 @@ class SignalDocument(_Model):
     device: Name
     read: Name
     invert: bool = False
-    on_loss: Literal["fault", "hold", "0", "1"] = "fault"
+    on_loss: Annotated[Literal["fault", "hold", "0", "1"], WithJsonSchema({"enum": ["fault", "hold", 0, 1]})] = "fault"
     edges: Name | None = None
     force: bool = False
 
@@ -148,6 +159,11 @@ def _signal(value: object) -> object:
     return None if value == ACKNOWLEDGED else {} if value is None else value
 
 
+BoundSignal = Annotated[
+    SignalDocument | None, BeforeValidator(_signal, json_schema_input_type=SignalDocument | Literal["acknowledged"])
+]
+
+
 class BindingDocument(_Model):
     """A whole binding."""
 
@@ -156,7 +172,7 @@ class BindingDocument(_Model):
     description: str = ""
     devices: dict[Name, DeviceDocument]
     emergency_stop: dict[Name, EmergencyDocument] = {}
-    signals: dict[Name, Annotated[SignalDocument | None, BeforeValidator(_signal)]] = {}
+    signals: dict[Name, BoundSignal] = {}
     commands: dict[Name, CommandDocument] = {}
 
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import asyncio
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, cast
 
-from pydantic import Field
+from pydantic import Field, WithJsonSchema
 
 from firable.executor.drivers.addresses import HostName, LinePath, one_name
 from firable.executor.drivers.device import (
@@ -56,7 +56,7 @@ class RtuOptions(Options):
     port: LinePath
     baud: int = Field(default=19_200, ge=300, le=4_000_000)
     parity: Literal["N", "E", "O"] = "E"
-    stop_bits: Literal["1", "2"] = "1"
+    stop_bits: Annotated[Literal["1", "2"], WithJsonSchema({"enum": [1, 2]})] = "1"
     unit: int = Field(default=1, ge=1, le=247)
     every_s: float = Field(default=0.02, ge=0, le=60, allow_inf_nan=False)
 
