@@ -1,13 +1,14 @@
-"""Timeouts that a promise keeps from firing: where a transition of several controllers reads what the timeout changes.
+"""Timeouts that a promise keeps from firing: where a transition of a coordinator reads what the timeout changes.
 
-While a controller has promised its part of a coordinated transition, what that part reads stays as it is (O1). A part
+While a controller has promised its part of a coordinated transition, what the part reads stays as it is (O1). A part
 that *takes* the token of a timed place wants the completion 1 and the timeout wants it 0, so these never meet. One that
 only reads does: while a decision is open, and for as long as the coordinator or the link is dead, the timeout cannot
-take the token that the part wants there, nor put one on the fault place that the part wants empty, and a timer that the
-part wants 0 is not set. Where the fault place stops a machine, the stop comes late. That is no mistake of the split,
-and what is proved holds; whoever draws the line between controllers has to know of it.
+take the token that the part wants there, put one on the fault place that it wants empty, nor clear a completion that it
+reads, and a timer that it wants 0 is not set. Where the fault place stops a machine, the stop comes late. That is no
+mistake of the split, and what is proved holds; whoever draws the line between controllers has to know of it.
 
-Cost: linear in the arcs and gates of the coordinated transitions.
+Arcs are left out: two transitions of one machine that share a completion or a place hardly ever have their tokens at
+the same time, and where they do, a coordinator decides them both. Cost: linear in the arcs and gates of the net.
 """
 
 from __future__ import annotations
@@ -16,33 +17,50 @@ from collections.abc import Iterator
 
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, Severity
-from firable.nets.net import Transition
+from firable.nets.net import Net, Transition
 
 
 def blocked_timeouts(decomposition: Decomposition) -> Iterator[Diagnostic]:
-    """Warnings of coordinated transitions that only read what a timeout changes (F4015), in the order of the table."""
+    """Warnings of coordinated transitions beside which a timeout has to wait (F4015), in the order of the table."""
     net = decomposition.net
-    taken, put, timed = dict[str, Transition](), dict[str, Transition](), dict[str, Transition]()
-    for p, t in net.fault_transitions.items():
-        place, timeout = net.places[p], net.transitions[t]
-        taken[place.name] = timed[place.cleared[-1]] = timeout
-        put |= dict.fromkeys(timeout.outputs, timeout)
-    for row in decomposition.coordinated if taken else ():
+    timers = {net.transitions[t]: net.places[p].cleared[-1] for p, t in net.fault_transitions.items()}
+    changing: dict[str, list[Transition]] = {}
+    for timeout, timer in timers.items():
+        for name in (*_changed(net, timeout), timer):
+            changing.setdefault(name, []).append(timeout)
+    for row in decomposition.coordinated if timers else ():
         transition = net.transition(row.name)
-        for kind, changed, read in (
-            ("if", taken, transition.permissive),
-            ("unless", put, transition.inhibitive),
-            ("unless", timed, tuple(gate.signal for gate in transition.external if not gate.wanted)),
-        ):
-            for name in read:
-                if name in changed:
-                    yield _blocked(transition, changed[name], f"{kind}: {name}")
+        gates = dict.fromkeys((*transition.permissive, *transition.inhibitive))
+        gates |= dict.fromkeys(gate.signal for gate in transition.external)
+        for timeout in dict.fromkeys(one for name in gates for one in changing.get(name, ())):
+            needs, others, timer = _needs(transition), _needs(timeout), timers[timeout]
+            if any(needs.get(name, value) != value for name, value in others.items() if name != timer):
+                continue  # they never meet
+            common = [
+                name for name in gates if timeout in changing.get(name, ()) and (name != timer or not needs[name])
+            ]
+            if common and timeout is not transition:
+                yield _blocked(transition, timeout, common)
 
 
-def _blocked(transition: Transition, timeout: Transition, gate: str) -> Diagnostic:
+def _needs(transition: Transition) -> dict[str, bool]:
+    """What a transition reads, and what it wants that to be."""
+    needs = dict.fromkeys((*transition.inputs, *transition.permissive), True)
+    needs |= dict.fromkeys((*transition.outputs, *transition.inhibitive), False)
+    return needs | {gate.signal: gate.wanted for gate in transition.external}
+
+
+def _changed(net: Net, timeout: Transition) -> frozenset[str]:
+    """The places and signals that a firing changes."""
+    cleared = (signal for place in timeout.outputs for signal in net.place(place).cleared)
+    return frozenset((*timeout.inputs, *timeout.outputs, *cleared))
+
+
+def _blocked(transition: Transition, timeout: Transition, common: list[str]) -> Diagnostic:
+    told = " and ".join(f"'{name}'" for name in common)
     return Diagnostic(
         "F4015",
-        f"'{timeout.name}' waits as long as '{transition.name}' is promised, which reads what it changes ({gate})",
+        f"'{timeout.name}' waits as long as '{transition.name}' is promised, which reads {told}",
         "read a place that no timeout moves, or leave a stop that must come in time to the machine's own controller",
         ("transitions", transition.name),
         severity=Severity.WARNING,

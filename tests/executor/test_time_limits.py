@@ -144,10 +144,15 @@ def test_a_timer_that_a_promise_reads_is_set_when_the_promise_ends() -> None:
     assert OVER in controller.receive(Decision("a", 0, "lit", 0, -1))
 
 
+WITH_STOP = ("a: {start: free, inputs: key, places: {", "a: {start: free, inputs: key, places: {go_fault: STOP, ")
+
+
 @pytest.mark.parametrize(
     ("gate", "waits"),
     [
         ("if: a.go", True),
+        ("if: a.stopped", True),
+        ("unless: a.stopped", True),
         ("unless: a.go_fault", True),
         ("unless: a.go_overdue", True),
         ("unless: a.go", False),
@@ -158,16 +163,41 @@ def test_a_timer_that_a_promise_reads_is_set_when_the_promise_ends() -> None:
     ],
 )
 def test_a_timeout_that_a_promise_would_keep_from_firing_is_warned_of(gate: str, waits: bool) -> None:
-    text = HANDOVER.replace("{idle: , has: }", "{idle: , has: , lamp: }")
+    text = HANDOVER.replace("{idle: , has: }", "{idle: , has: , lamp: }").replace(*WITH_STOP)
+    text = text.replace("go_fault: STOP", "go_fault: {send: {machine: A, command: STOP}, until: stopped}")
     decomposition = split(parse_net(text.replace("  use:", f"  lit: {{from: b.idle, to: b.lamp, {gate}}}\n  use:")))
     controller = LocalController(decomposition, "a")
+    if gate == "if: a.stopped":
+        controller.read("a.stopped", value=True)
     controller.fire()
     controller.tick(0.0)
     controller.receive(VoteRequest("a", 0, ("lit",), 0, -1))
     controller.tick(1.0)
     assert (Firing("a.go_timeout") in controller.fire()) is not waits
-    warned = [one for one in blocked_timeouts(decomposition) if f"({gate})" in one.message]
+    warned = [*blocked_timeouts(decomposition)]
     assert [(one.code, one.subject) for one in warned] == ([("F4015", ("transitions", "lit"))] if waits else [])
+    assert all(one.message.endswith(f"which reads '{gate.split()[1]}'") for one in warned)
+
+
+def test_each_of_several_timeouts_that_wait_for_one_decision_is_named() -> None:
+    text = """
+firable: 1
+cell: c
+controllers:
+  a:
+    start: [one, two]
+    places:
+      one: {send: {machine: A, command: GO}, until: done, within: {time: 1s, to: stuck}}
+      two: {send: {machine: B, command: GO}, until: ready, within: {time: 1s, to: stuck}}
+      stuck:
+  b: {start: idle, places: {idle: , lamp: , busy: {send: {machine: C, command: GO}, until: over}}}
+transitions:
+  t1: {from: a.one, to: a.two}
+  t2: {from: a.two, to: a.one}
+  lit: {from: b.idle, to: b.lamp, unless: a.stuck}
+"""
+    waiting = [one.message.split("'")[1] for one in blocked_timeouts(split(parse_net(text)))]
+    assert waiting == ["a.one_timeout", "a.two_timeout"]
 
 
 def test_a_timeout_waits_for_no_transition_that_takes_the_token_or_is_decided_by_its_controller_alone() -> None:
