@@ -39,13 +39,12 @@ def overlaps(document: BindingDocument, is_one: Callable[[str, str], bool]) -> I
 
     `is_one` tells of two devices whether they stand at one address.
     """
-    apart: list[tuple[str, _Points]] = []
+    found: dict[str, _Points] = {}
     for device in document.devices:
-        points = next((points for name, points in apart if is_one(name, device)), None)
-        if points is None:
-            apart.append((device, points := _Points()))
-        yield from _gives(document, device, points)
-        yield from _answers(document, device, points)
+        found[device] = next((points for name, points in found.items() if is_one(name, device)), _Points())
+    for judge in (_gives, _writes, _answers):  # each of all devices, before what is judged by it
+        for device, points in found.items():
+            yield from judge(document, device, points)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,11 +70,15 @@ def _gives(document: BindingDocument, device: str, points: _Points) -> Iterator[
         of, other = written.setdefault(point, (device, role))
         if (of, other) != (device, role) and not (other == _HEARTBEAT and role == _HEARTBEAT):
             yield _two(path, device, point, of, other, role)
+
+
+def _writes(document: BindingDocument, device: str, points: _Points) -> Iterator[Overlap]:
+    """What commands write where a command is given, or the heartbeat."""
     for place, command in document.commands.items():
         for point in command.write if command.device == device else ():
-            if point in written:
+            if point in points.written:
                 role = f"what the command of '{place}' writes"
-                yield _two(("commands", place, "write", point), device, point, *written[point], role)
+                yield _two(("commands", place, "write", point), device, point, *points.written[point], role)
 
 
 def _answers(document: BindingDocument, device: str, points: _Points) -> Iterator[Overlap]:

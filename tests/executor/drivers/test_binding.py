@@ -270,6 +270,21 @@ def test_a_point_that_means_two_things_by_two_devices_at_one_address_is_refused(
         assert not keys
 
 
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ("{number: holding 11, taken: holding 15}", "{number: holding 15}"),
+        ("{number: holding 15}", "{number: holding 11, taken: holding 15}"),
+    ],
+)
+def test_it_is_refused_whichever_device_stands_first(first: str, second: str) -> None:
+    device = "{{driver: modbus-tcp, host: 10.0.0.9, channels: {{O: {}}}}}".format
+    text = edited("signals:", f"  one: {device(first)}\n  two: {device(second)}\nsignals:")
+    with pytest.raises(InputError) as refused:
+        parse_binding(text)
+    assert [(one.code, one.subject[-1]) for one in refused.value.diagnostics] == [("F5102", "taken")]
+
+
 def test_a_common_alarm_of_machines_without_numbers_and_requests_among_the_safe_outputs_are_taken() -> None:
     text = edited("number: holding 1, taken: input 1, done: input 2", "request: coil 1, done: coil 2, failed: coil 4")
     parse_binding(text.replace("number: holding 5", "request: coil 5, done: coil 6, failed: coil 4"))
