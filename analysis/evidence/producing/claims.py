@@ -281,7 +281,7 @@ class Certifier:
             if self.discipline is Discipline.STEP:
                 raise LackingError(f"there are more than {MARKINGS_MAX:,} markings")
             found, left = runs_by_search(
-                net, tuple(names), Limits(self.spaces.part_of_a_search(0.5), self.limits.memory_bytes)
+                net, tuple(names), Limits(self.spaces.part_of_a_run(), self.limits.memory_bytes)
             )
             found += [self._run_firing(name, home) for name in left]
             return [FiringSequence((*prefix, *run)) for run in found]
