@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 _REFRESH_SECONDS = 0.25
 _ENDED = "the emergency stop has ended the sending"
+_TOO_EARLY = "it was asked to end before the devices were there"
 _COLOURS = {"good": "green", "uncertain": "yellow", "bad": "red"}
 
 
@@ -281,6 +282,7 @@ async def _shown(
     import asyncio
 
     from firable.executor.drivers.bound import BoundDriver
+    from firable.executor.drivers.bound_device import ByHand
     from firable.executor.drivers.driver import Quality
     from firable.executor.drivers.sparing import sparing
 
@@ -289,9 +291,10 @@ async def _shown(
     try:
         for signal, value in forced:
             heard.by_hand.append((f"--force {signal}={value:d}", driver.force(signal, value)))
+        forced_alone = len(heard.by_hand)
+        heard.by_hand += [(f"--send {place.name}", ByHand(refused=_TOO_EARLY)) for place in places]
         reached = await _connected(driver, running)
-        for place in places:
-            heard.by_hand.append((f"--send {place.name}", driver.send_by_hand(place)))
+        heard.by_hand[forced_alone:] = [(f"--send {place.name}", driver.send_by_hand(place)) for place in places]
         while not running.done() and _is_writing(driver, heard):
             await asyncio.sleep(0.01)
         if once:
@@ -319,7 +322,7 @@ def _is_writing(driver: BoundDriver, heard: _Heard) -> bool:
     """
     there = [device for device in driver.devices.values() if device.is_ready.is_set()]
     return any(
-        device.forced or (not heard.failed and (device.is_writing or (device.sent and not device.untaken)))
+        device.forced or (not heard.failed and not device.untaken and (device.is_writing or device.sent))
         for device in there
     )
 

@@ -6,7 +6,7 @@ its machine busy, and its completion has the effect (a hand is elsewhere, a work
 same rules serve a net that is played, a trace and a running cell, bound to real machines or not.
 
 It is a picture and judges nothing. A transfer from a station where no workpiece is known to lie moves none; only at the
-station of the arrivals one appears, with its sensor or when it is first taken, and at that of the departures it is
+station of the arrivals one appears, with its sensor or when it is first taken, and at those of the departures it is
 taken away with the next firing. What really lies where is known to nobody but the cell (`executor/cell/plant.py`
 simulates that, with accidents, and `check --machines` proves things of it).
 """

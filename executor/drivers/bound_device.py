@@ -39,7 +39,7 @@ _POINTS: Final = "are the points written as the device has them?"
 
 @dataclass(slots=True)
 class ByHand:
-    """What a person has written or sent, on one connection alone: nothing may move when a line is plugged in later."""
+    """What a person has forced or sent, once: no machine may move by it when its line is plugged in anew."""
 
     is_done: bool = False
     """Whether the device has confirmed the value, or shown that it has the command."""

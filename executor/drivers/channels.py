@@ -94,11 +94,11 @@ class Channel:
         self.is_taken = False
         """Whether the device has the newest order: it has shown its number, or confirmed it where it shows none."""
         self.is_withdrawn = False
-        """Whether the newest order is not to be written again, should its connection fail before the device has it."""
+        """Whether the newest order is not to be written again, and the next does not wait until the device has it."""
         self.failed_before: int | None = None
         """The number that was shown as failed when a restart asked, as long as it is: somebody was asked what to do."""
-        self.is_left_standing = False
-        """Whether a command that was given up may stand at the device, which would still take it."""
+        self.given_up: set[int] = set()
+        """The numbers of commands that were given up, and may stand at the device, which would still take them."""
         self.not_received: set[int] = set()
         """The numbers of which a restart was told that the device had not received them."""
 
@@ -138,6 +138,7 @@ class Channel:
         Otherwise a machine would move when its link comes back, by a command whose token has long left the place.
         """
         self.waiting = deque(order for order in self.waiting if order.place != place)
+        self.given_up |= {number for number, order in self.untaken.items() if order.place == place}
         if self.current is None or self.current.place != place:
             return
         if self.phase in {_Phase.HELD, _Phase.CLEARING}:
@@ -148,15 +149,14 @@ class Channel:
     def next_writes(self) -> Writes | None:
         """What is to be written now, if anything; `written` follows when the device has it."""
         if self._delivered() and self.waiting:
-            self.is_left_standing |= self._is_given_up
             self.current, self.phase, self.is_taken = self.waiting.popleft(), _Phase.HELD, False
             self.is_withdrawn = False
         order = self.current
         if order is None or self.phase in {_Phase.WRITING, _Phase.WRITTEN}:
             return None
         is_shown = order.number in self.shown.values() and order.number not in self.not_received
-        if is_shown or self.is_left_standing:
-            if self.phase is _Phase.CLEARING and not self.is_left_standing:
+        if is_shown or self.given_up:
+            if self.phase is _Phase.CLEARING and not self.given_up:
                 return None
             self.phase = _Phase.CLEARING
             return self._numbered(0, "")
@@ -169,7 +169,8 @@ class Channel:
     def written(self) -> tuple[Outcome, ...]:
         """The device has confirmed what was to be written; returns what that tells, where it does not tell more."""
         if self.phase is _Phase.CLEARING:
-            self.is_left_standing = False
+            self.untaken = {number: one for number, one in self.untaken.items() if number not in self.given_up}
+            self.given_up.clear()
         if self.phase is not _Phase.WRITING or (order := self.current) is None:
             return ()
         self.phase = _Phase.WRITTEN
@@ -208,8 +209,8 @@ class Channel:
             return None
         if order.number in self.shown.values() and self.phase is not _Phase.CLEARING:
             self.phase = _Phase.WRITTEN
-        elif self._is_given_up:
-            self.current, self.phase, self.is_left_standing = None, _Phase.WRITTEN, True
+        elif not self.is_taken and self.is_withdrawn:
+            self.current, self.phase = None, _Phase.WRITTEN
         elif not self.is_taken:
             self.phase = _Phase.HELD
         else:
@@ -270,6 +271,7 @@ class Channel:
 
     def _has(self, number: int) -> tuple[Outcome, ...]:
         order = self.untaken.pop(number, None)
+        self.given_up.discard(number)
         return () if order is None else (Outcome(order, Said.TAKEN),)
 
     def _delivered(self) -> bool:
@@ -277,11 +279,6 @@ class Channel:
         if self.current is None:
             return True
         return self.phase is _Phase.WRITTEN and (self.is_taken or self.document.taken is None or self.is_withdrawn)
-
-    @property
-    def _is_given_up(self) -> bool:
-        """Whether the newest order was given up, and the device is not known to have it."""
-        return self.current is not None and self.is_withdrawn and not self.is_taken
 
     def _numbered(self, number: int, text: str) -> Writes:
         if self.document.number is not None:

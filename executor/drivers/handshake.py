@@ -91,6 +91,8 @@ class Handshake:
             self.current, self.phase = None, _Phase.OVER
         else:
             self.is_withdrawn = True
+            if self.phase is _Phase.ASKING and self.writing is None:  # it was to be asked for anew
+                self.phase = _Phase.OVER
             self._let_go()
 
     def next_writes(self) -> Writes | None:

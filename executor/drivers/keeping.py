@@ -373,7 +373,6 @@ class Kept:
             elif is_due and heartbeat is not None:
                 beaten, due = True, loop.time() + heartbeat.every_s
                 await self._beat(connection, heartbeat.write)
-                self.beat = (self.beat + 1) % BEATS
             else:
                 timer = None if heartbeat is None else loop.call_later(due - loop.time(), self.awake.set)
                 self.idle = self.prompt
@@ -399,14 +398,24 @@ class Kept:
             self.started |= was_alive
 
     async def _write_last(self, connection: Connection) -> None:
-        """Write the safe outputs of the stop, once more when a device that has not been seen to be alive is."""
+        """Write the safe outputs of the stop, once more when a device that has not been seen to be alive is.
+
+        Heartbeats go out meanwhile, as it may make its sign of life from them, and the safe outputs behind each.
+        """
         was_alive = self.is_alive
         await connection.write(self.safe)
-        if not was_alive:
-            while not self.is_alive:
-                self.awake.clear()
+        if was_alive:
+            return
+        while not self.is_alive:
+            self.awake.clear()
+            if (heartbeat := self.document.heartbeat) is None:
                 await self.awake.wait()
+                continue
+            await self._beat(connection, heartbeat.write)
             await connection.write(self.safe)
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self.awake.wait(), heartbeat.every_s)
+        await connection.write(self.safe)
 
     async def _get_ready(self, connection: Connection) -> None:
         """Let the device be commanded, which has shown what it shows, and that it is alive."""
@@ -443,6 +452,7 @@ class Kept:
         try:
             async with asyncio.timeout(self.document.timeout_s / 2 if self.stopping else None) as self.beating:
                 await connection.write(((point, self.beat),))
+                self.beat = (self.beat + 1) % BEATS
         finally:
             self.beating = None
 

@@ -246,6 +246,26 @@ def test_command_for_a_device_that_is_not_there_is_not_sent_and_an_error_at_the_
     assert capsys.readouterr().err.splitlines()[-1] == f"error: --send a.away was not taken: {why}"
 
 
+def test_command_is_an_error_also_when_io_is_asked_to_end_before_its_device_was_there(tmp_path: Path) -> None:
+    net, bind = tmp_path / "arm.firable.yaml", tmp_path / "arm.bind.yaml"
+    net.write_text(NET)
+    bind.write_text(BIND.replace("port: PORT", "port: /dev/nobody-is-here, start_s: 60"))
+
+    async def main() -> tuple[int | None, str]:
+        with heard(signal.SIGTERM):
+            process = await io(bind, "--net", str(net), "--send", "a.away")
+        assert process.stderr is not None
+        said = b""
+        while b"not connected" not in said:
+            said = await asyncio.wait_for(process.stderr.readline(), PATIENCE_SECONDS)
+        process.send_signal(signal.SIGTERM)
+        _, rest = await asyncio.wait_for(process.communicate(), PATIENCE_SECONDS)
+        return process.returncode, rest.decode().splitlines()[-1]
+
+    why = "it was asked to end before the devices were there"
+    assert asyncio.run(main()) == (1, f"error: --send a.away was not taken: {why}")
+
+
 def test_value_that_could_not_be_written_is_an_error_also_when_io_is_asked_to_end(tmp_path: Path) -> None:
     bind = tmp_path / "arm.bind.yaml"
     bind.write_text(FORCED.replace("driver: theirs, memory: refusing", "driver: serial, port: /dev/nobody-is-here"))

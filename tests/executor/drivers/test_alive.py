@@ -201,6 +201,21 @@ def test_the_safe_outputs_of_a_stop_come_once_more_when_the_device_is_seen_to_be
     assert watched(test).driver.unconfirmed == ()
 
 
+def test_a_device_that_makes_its_sign_of_life_from_the_heartbeat_confirms_a_stop_on_a_new_connection() -> None:
+    async def test(w: Watched) -> None:
+        await until(w.device.is_ready.is_set, "the connection")
+        await w.end.cut()
+        await until(lambda: not w.device.kept.is_connected, "the loss")
+        w.driver.stop()
+        w.written.clear()
+        await w.end.mend()
+
+    w = watched(test, echoes=True)
+    assert w.driver.unconfirmed == ()
+    assert [w.written[0], w.written[-1]] == ["output", "output"], "at once, and as the last thing"
+    assert "beat" in w.written
+
+
 def test_a_device_that_is_never_seen_to_be_alive_is_lost_when_its_start_is_over() -> None:
     async def test(w: Watched) -> None:
         await asyncio.sleep(1.9)

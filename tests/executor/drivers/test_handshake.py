@@ -107,6 +107,18 @@ def test_command_that_was_given_up_stands_in_the_way_until_the_device_has_let_go
         assert put(one) == (("q", True),)
 
 
+def test_request_that_was_given_up_before_it_is_repeated_falls() -> None:
+    """A machine would move by it when its line is back, by no token."""
+    one = bits()
+    one.send("a", 1, "", (("code", 5),))
+    assert put(one) == (("q", False),)
+    assert one.next_writes() == (("code", 5), ("q", True))
+    assert one.connected_again() is None  # nobody knows whether it has come
+    one.withdraw("a")
+    assert put(one) == (("q", False),)
+    assert put(one) is None
+
+
 def test_what_waits_behind_another_is_given_up_without_a_word() -> None:
     one = bits()
     one.send("a", 1, "", ())

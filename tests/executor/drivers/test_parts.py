@@ -181,6 +181,50 @@ def test_command_that_was_given_up_or_followed_by_another_of_its_place_is_not_se
     assert not one.is_writing
 
 
+GIVEN_UP = ("while it is awaited", "while the line is down", "while it is to be written again", "after a restart")
+
+
+@pytest.mark.parametrize("taken", [True, False], ids=["taken", "blind"])
+@pytest.mark.parametrize("when", GIVEN_UP)
+def test_number_0_goes_out_before_what_follows_a_command_that_was_given_up_and_may_stand_at_the_device(
+    when: str, taken: bool
+) -> None:
+    """Its number must not be taken with what the next one writes."""
+    one = channel("move", "halt", answered=["move"], taken=taken)
+    one.shows("done", 0)
+    if when == GIVEN_UP[3]:
+        one.expect("move", 1)
+    else:
+        one.send("move", 1, "", (("code", 1),))
+        assert one.next_writes() == (("code", 1), ("n", one.number("move", 1)))
+        if taken or when == GIVEN_UP[0]:  # of one that shows nothing, what is confirmed is had
+            one.written() if taken else None
+        if when == GIVEN_UP[2]:
+            assert one.connected_again() is None
+    one.withdraw("move")
+    if when == GIVEN_UP[1] or (when == GIVEN_UP[0] and not taken):
+        assert one.connected_again() is None
+    one.send("halt", 1, "", (("code", 9),))
+    assert one.next_writes() == (("n", 0),)
+    one.written()
+    halting = (("code", 9), ("n", one.number("halt", 1)))
+    assert one.next_writes() == halting
+    one.written()
+    one.shows("taken", one.number("halt", 1))
+    one.send("move", 2, "", ())
+    assert one.next_writes() == (("n", one.number("move", 2)),), "0 goes out once"
+
+
+def test_nothing_goes_out_before_what_follows_a_command_that_was_given_up_and_was_taken() -> None:
+    one = channel("move", "halt", answered=["move"])
+    one.send("move", 1, "", ())
+    assert after(one, taken=0, done=0) == (("n", one.number("move", 1)),)
+    one.withdraw("move")
+    one.written()
+    one.send("halt", 1, "", ())
+    assert after(one, taken=one.number("move", 1)) == (("n", one.number("halt", 1)),)
+
+
 def test_command_without_completion_is_asked_after_by_the_number_that_it_was_sent_with() -> None:
     one = channel("a", "b")
     one.send("b", 2, "", ())
