@@ -52,6 +52,19 @@ async def io(bind: Path, *arguments: str) -> asyncio.subprocess.Process:
     return await asyncio.create_subprocess_exec(*command, stdin=pipe, stdout=pipe, stderr=pipe)
 
 
+async def terminated(
+    process: asyncio.subprocess.Process, stream: asyncio.StreamReader | None, told: bytes
+) -> tuple[int | None, str]:
+    """Ask it to end when it has told this on a stream; its exit code, and its last words."""
+    assert stream is not None
+    line = b""
+    while told not in line:
+        line = await asyncio.wait_for(stream.readline(), PATIENCE_SECONDS)
+    process.send_signal(signal.SIGTERM)
+    _, said = await asyncio.wait_for(process.communicate(), PATIENCE_SECONDS)
+    return process.returncode, said.decode().splitlines()[-1]
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP], ids=lambda number: number.name)
 def test_machine_that_was_sent_something_is_stopped_however_io_is_asked_to_end(
     number: signal.Signals, tmp_path: Path
@@ -254,13 +267,7 @@ def test_command_is_an_error_also_when_io_is_asked_to_end_before_its_device_was_
     async def main() -> tuple[int | None, str]:
         with heard(signal.SIGTERM):
             process = await io(bind, "--net", str(net), "--send", "a.away")
-        assert process.stderr is not None
-        said = b""
-        while b"not connected" not in said:
-            said = await asyncio.wait_for(process.stderr.readline(), PATIENCE_SECONDS)
-        process.send_signal(signal.SIGTERM)
-        _, rest = await asyncio.wait_for(process.communicate(), PATIENCE_SECONDS)
-        return process.returncode, rest.decode().splitlines()[-1]
+        return await terminated(process, process.stderr, b"not connected")
 
     why = "it was asked to end before the devices were there"
     assert asyncio.run(main()) == (1, f"error: --send a.away was not taken: {why}")
@@ -273,13 +280,7 @@ def test_value_that_could_not_be_written_is_an_error_also_when_io_is_asked_to_en
     async def main() -> tuple[int | None, str]:
         with heard(signal.SIGTERM):
             process = await io(bind, "--force", "a.key=1")
-        assert process.stdout is not None
-        shown = b""
-        while b"a.key" not in shown:  # when its start is over
-            shown = await asyncio.wait_for(process.stdout.readline(), PATIENCE_SECONDS)
-        process.send_signal(signal.SIGTERM)
-        _, said = await asyncio.wait_for(process.communicate(), PATIENCE_SECONDS)
-        return process.returncode, said.decode().splitlines()[-1]
+        return await terminated(process, process.stdout, b"a.key")  # when its start is over
 
     why = "bench is not connected: /dev/nobody-is-here: No such file or directory"
     assert asyncio.run(main()) == (1, f"error: --force a.key=1 was not written: {why}")
