@@ -24,7 +24,8 @@ DIGITS_MAX: Final = 18
 _DIGITS: Final = re.compile(rf"0|-?[1-9][0-9]{{0,{DIGITS_MAX - 1}}}")
 
 
-def _as_list(value: object) -> object:
+def as_list(value: object) -> object:
+    """One name as the list of it alone."""
     # Nothing is no list: `{from: , to: b}` is a name forgotten, and would be a transition that waits for nothing.
     return [value] if isinstance(value, str) else value
 
@@ -65,7 +66,7 @@ def _as_pair(value: object) -> object:
 
 
 Name = Annotated[str, Field(min_length=1)]
-Names = Annotated[list[Name], BeforeValidator(_as_list, json_schema_input_type=Name | list[Name])]
+Names = Annotated[list[Name], BeforeValidator(as_list, json_schema_input_type=Name | list[Name])]
 OptionalName = Annotated[Name | None, BeforeValidator(given, json_schema_input_type=Name)]
 OptionalNames = Annotated[Names | None, BeforeValidator(given, json_schema_input_type=Name | list[Name])]
 Text = str

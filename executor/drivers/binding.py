@@ -25,7 +25,7 @@ from firable.executor.drivers.device import Bounded, DeviceKind, Divided, Option
 from firable.executor.drivers.kinds import kind_named
 from firable.executor.drivers.overlapping import overlaps
 from firable.nets.diagnostics import Diagnostic, InputError, did_you_mean
-from firable.nets.document import given
+from firable.nets.document import as_list, given
 from firable.nets.document_errors import Shape, document_problems, keys_of, version_problem
 from firable.nets.source import Source, printable, quoted, read_bytes, read_source
 from firable.nets.yaml_tree import Data, Node, data, node_span, nodes_along, parse_tree
@@ -39,17 +39,13 @@ ACKNOWLEDGED: Final = "acknowledged"
 """How the binding writes of a completion that no sensor has a part in it."""
 
 
-def _as_list(value: object) -> object:
-    return [value] if isinstance(value, str) else value
-
-
 Name = Annotated[str, Field(min_length=1)]
 Seconds = Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)]
 Grace = Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)]
 Controllers = Annotated[
     tuple[Name, ...] | None,
     BeforeValidator(
-        lambda value: given(_as_list(value) or None),
+        lambda value: given(as_list(value) or None),
         json_schema_input_type=Name | Annotated[list[Name], Field(min_length=1)],
     ),
 ]

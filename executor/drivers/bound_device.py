@@ -425,9 +425,9 @@ class BoundDevice:
         order = outcome.order
         match outcome.said:
             case Said.TAKEN:
-                if by_hand := [one for one in self.sent if one[0] == order.place]:
-                    self.sent.remove(by_hand[0])
-                    by_hand[0][1].is_done = True
+                if by_hand := next((one for one in self.sent if one[0] == order.place), None):
+                    self.sent.remove(by_hand)
+                    by_hand[1].is_done = True
                 if self.driver.listener is not None:
                     self.driver.listener.taken(order.place, order.entry)
             case Said.FAILED:

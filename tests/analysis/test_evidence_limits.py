@@ -308,5 +308,8 @@ def test_searches_for_something_smaller_share_one_part_of_the_time_where_all_mar
     held = producing.Spaces(net, Discipline.INTERLEAVING, limits, explore(net))
     first, second = (held.part_of_a_search(1.0).at_seconds for _ in range(2))
     assert first == second < limits.deadline.at_seconds - 700
+    held._for_less = Deadline.after(0)  # it is used up
+    assert held.part_of_a_search(1.0).over
+    assert not held.part_of_a_run().over, "what fires something has a part of its own"
     alone = producing.Spaces(net, Discipline.INTERLEAVING, limits)
     assert alone.part_of_a_search(1.0).at_seconds > limits.deadline.at_seconds - 700
