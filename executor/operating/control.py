@@ -25,7 +25,9 @@ step. Rejected: a server process of its own (uvicorn), which takes the signals o
 
 from __future__ import annotations
 
+import asyncio
 import ipaddress
+import logging
 import secrets
 import ssl
 import time
@@ -36,6 +38,7 @@ from functools import partial
 from typing import Final, Protocol
 
 from aiohttp import web
+from aiohttp.http_exceptions import HttpProcessingError
 from aiohttp.typedefs import Handler, Middleware
 
 from firable.executor.operating.own_certificate import fault_of, fault_of_authority, unloaded
@@ -141,6 +144,43 @@ class Endpoint:
         return self.tls is not None and self.tls.verify_mode is ssl.CERT_REQUIRED
 
 
+class Strangers:
+    """Those who were not let in: told of once for each address and path, and `STRANGERS_MAX` at most.
+
+    No trace is theirs to fill.
+    """
+
+    def __init__(self, tell: Callable[[str, str], None] = lambda _what, _by: None) -> None:
+        self.tell = tell
+        self.told: set[tuple[str, str]] = set()
+
+    def turned_away(self, what: str, by: str | None) -> None:
+        """Somebody has asked for what, and was not let in."""
+        stranger = printable(what[:100]), by or "somebody"
+        if stranger not in self.told and len(self.told) < STRANGERS_MAX:
+            self.told.add(stranger)
+            self.tell(*stranger)
+
+
+class _Complaints(logging.Handler):
+    """What aiohttp has to say of requests, which it would write to the terminal with all its calls.
+
+    A request that is none comes from a stranger; an error in answering one is the event loop's to tell.
+    """
+
+    def __init__(self, strangers: Strangers) -> None:
+        super().__init__(logging.ERROR)
+        self.strangers = strangers
+
+    def emit(self, record: logging.LogRecord) -> None:
+        error = record.exc_info[1] if record.exc_info else None
+        if isinstance(error, HttpProcessingError):
+            by = record.args[0] if isinstance(record.args, tuple) and record.args else None
+            self.strangers.turned_away("what is no request", None if by is None else str(by))
+        else:
+            asyncio.get_running_loop().call_exception_handler({"message": record.getMessage(), "exception": error})
+
+
 @asynccontextmanager
 async def serving(
     run: Operated, endpoint: Endpoint, figures: Callable[[], bytes], page: Page | None = None
@@ -149,14 +189,17 @@ async def serving(
 
     Raises `InputError` F5061 where the address cannot be had.
     """
-    async with listening(application(run, endpoint, figures, page), endpoint) as address:
+    strangers = Strangers(run.turned_away)
+    async with listening(application(run, endpoint, figures, page, strangers), endpoint, strangers) as address:
         yield address
 
 
 @asynccontextmanager
-async def listening(app: web.Application, endpoint: Endpoint) -> AsyncIterator[str]:
+async def listening(app: web.Application, endpoint: Endpoint, strangers: Strangers | None = None) -> AsyncIterator[str]:
     """Serve an application for as long as the context lasts; gives the address, and raises `InputError` F5061."""
-    runner = web.AppRunner(app, access_log=None, shutdown_timeout=SHUTDOWN_SECONDS)
+    complaints = logging.Logger("firable.endpoint")  # of its own: several in one process tell different runs
+    complaints.addHandler(_Complaints(strangers or Strangers()))
+    runner = web.AppRunner(app, access_log=None, logger=complaints, shutdown_timeout=SHUTDOWN_SECONDS)
     await runner.setup()
     try:
         site = web.TCPSite(runner, endpoint.host, endpoint.port, ssl_context=endpoint.tls)
@@ -172,22 +215,14 @@ async def listening(app: web.Application, endpoint: Endpoint) -> AsyncIterator[s
         await runner.cleanup()
 
 
-def admission(
-    endpoint: Endpoint, public: Collection[str] = (), turned_away: Callable[[str, str], None] = lambda _what, _by: None
-) -> Middleware:
-    """Let only those reach a handler who may, but for the paths that are public.
-
-    Who else asks is told of once for each address and path, and of `STRANGERS_MAX` at most: no trace is theirs to fill.
-    """
-    strangers: set[tuple[str, str]] = set()
+def admission(endpoint: Endpoint, public: Collection[str] = (), strangers: Strangers | None = None) -> Middleware:
+    """Let only those reach a handler who may, but for the paths that are public."""
+    strangers = strangers or Strangers()
 
     @web.middleware
     async def who_may(request: web.Request, handler: Handler) -> web.StreamResponse:
         if request.path not in public and _name_of(request, endpoint) is None:
-            stranger = printable(request.path[:100]), request.remote or "somebody"
-            if stranger not in strangers and len(strangers) < STRANGERS_MAX:
-                strangers.add(stranger)
-                turned_away(*stranger)
+            strangers.turned_away(request.path, request.remote)
             return web.json_response(
                 {"error": "who are you? show the token"}, status=401, headers={"WWW-Authenticate": "Bearer"}
             )
@@ -197,7 +232,11 @@ def admission(
 
 
 def application(
-    run: Operated, endpoint: Endpoint, figures: Callable[[], bytes], page: Page | None = None
+    run: Operated,
+    endpoint: Endpoint,
+    figures: Callable[[], bytes],
+    page: Page | None = None,
+    strangers: Strangers | None = None,
 ) -> web.Application:
     """The endpoint as an application; every handler runs only for who may, but for those of a page's own files."""
 
@@ -252,7 +291,7 @@ def application(
         refused = [] if is_asked else [f"nobody asks after {place}" if word in _SAID else f"say {', '.join(_SAID)}"]
         return answered(request, command, refused)
 
-    who_may = admission(endpoint, () if page is None else page.public, run.turned_away)
+    who_may = admission(endpoint, () if page is None else page.public, strangers)
     app = web.Application(middlewares=[who_may], client_max_size=1024)
     app.router.add_get("/situation", situation)
     app.router.add_get("/metrics", metrics)
@@ -308,7 +347,7 @@ def _name_of(request: web.Request, endpoint: Endpoint) -> str | None:
         names = [value for rdn in certificate.get("subject", ()) for key, value in rdn if key == "commonName"]
         return names[0] if names else "a certificate without a name"
     scheme, _, shown = request.headers.get("Authorization", "").partition(" ")
-    if scheme == "Bearer" and secrets.compare_digest(shown.encode(), endpoint.token.encode()):
+    if scheme == "Bearer" and secrets.compare_digest(shown.encode(errors="surrogateescape"), endpoint.token.encode()):
         return "token"
     return None
 

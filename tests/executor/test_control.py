@@ -22,6 +22,7 @@ from support.certificates import Site
 from firable.cli.run import run
 from firable.executor.drivers.bench import PATIENCE_S, until
 from firable.executor.operating.control import STRANGERS_MAX, Endpoint, new_token, serving, tls_context
+from firable.executor.operating.service import unhandled
 from firable.executor.operating.situation import Situation, State
 from firable.executor.protocol.commands import Answer
 from firable.nets.diagnostics import InputError
@@ -198,6 +199,54 @@ def test_a_stranger_fills_no_trace() -> None:
     told = with_endpoint(Endpoint("127.0.0.1", 0, TOKEN), ask)
     assert len(told) == STRANGERS_MAX
     assert told[0] == "127.0.0.1: /0·[31m not let in"
+
+
+async def sent_raw(url: str, request: bytes) -> bytes:
+    """The first line of the answer to these bytes."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", int(url.rpartition(":")[2]))
+    writer.write(request + b"\r\nHost: cell\r\nContent-Length: 0\r\n\r\n")
+    try:
+        return await reader.readline()
+    finally:
+        writer.close()
+
+
+def test_what_is_no_request_or_no_text_lets_nobody_in_and_writes_on_no_terminal(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    async def ask(_session: ClientSession, url: str) -> None:
+        no_text = b"POST /stop HTTP/1.1\r\nAuthorization: Bearer \xff\xfe"
+        assert await sent_raw(url, no_text) == b"HTTP/1.1 401 Unauthorized\r\n"
+        for _ in range(3):
+            assert await sent_raw(url, b"POST /st\xff HTTP/1.1") == b"HTTP/1.0 400 Bad Request\r\n"
+
+    told = with_endpoint(Endpoint("127.0.0.1", 0, TOKEN), ask)
+    assert told == ["127.0.0.1: /stop not let in", "127.0.0.1: what is no request not let in"]
+    assert capsys.readouterr() == ("", "")
+
+
+def test_an_error_in_answering_is_told_by_the_loop(capsys: pytest.CaptureFixture[str]) -> None:
+    def figures() -> bytes:
+        raise ValueError("no figures")
+
+    told: list[str] = []
+
+    async def main() -> None:
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: told.append(unhandled(context)))
+        endpoint = Endpoint("127.0.0.1", 0, TOKEN)
+        async with (
+            serving(Told(), endpoint, figures) as url,
+            ClientSession(headers=BEARER) as session,
+            session.get(f"{url}/metrics") as answer,
+        ):
+            assert answer.status == 500
+
+    asyncio.run(main())
+    (one,) = told
+    assert one.startswith(
+        "an error that nobody has handled: Error handling request from 127.0.0.1: ValueError: no figures"
+    )
+    assert capsys.readouterr() == ("", "")
 
 
 def test_figures_are_served_as_text_for_prometheus() -> None:
