@@ -35,9 +35,12 @@ from firable.executor.links.standing import Standing
 from firable.executor.links.storages import Memory, Met, Storage
 from firable.executor.protocol.messages import Message
 from firable.executor.reasons import port_reason
+from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.interchange import canonical_json
 
 MASTER: Final = 0
+STATIONS_MAX: Final = 255
+"""An address is a byte."""
 LEASE_SECONDS: Final = 1.0
 ANSWER_SECONDS: Final = 0.05
 """How long a station may take to begin its answer."""
@@ -263,6 +266,11 @@ class SerialLink:
             known = {name: str(met) for name, met in memory.known.items() if self.addresses.get(name) == to}
             said = _Said(self.greeting, self.instance, str(memory.storage), known)
             payload = canonical_json(_SAID.dump_python(said, mode="json"))
+            if len(payload) > PAYLOAD_BYTES_MAX:
+                raise has_failed(
+                    self.port,
+                    f"a greeting with all machines here has {len(payload):,} bytes, and a frame {PAYLOAD_BYTES_MAX:,}",
+                )
             return pack_frame(Frame(to, self.own, Kind.GREETING, number, payload))
         before = b"" if self.standing is Standing.GOING else canonical_json(self.standing.value) + b"\n"
         lines: list[bytes] = []
@@ -402,9 +410,16 @@ class SerialLink:
 def addresses_on_a_line(coordinators: tuple[str, ...], controllers: tuple[str, ...]) -> dict[str, int]:
     """The address of each machine: the coordinators are the master, controllers are numbered from 1.
 
+    Raises `InputError` F5021 where there are more controllers than addresses.
+
     >>> addresses_on_a_line(("",), ("system", "robot"))
     {'': 0, 'system': 1, 'robot': 2}
     """
+    if len(controllers) > STATIONS_MAX:
+        message = (
+            f"a serial line has {STATIONS_MAX} addresses for stations, and the cell {len(controllers):,} controllers"
+        )
+        raise InputError([Diagnostic("F5021", message, "link the hosts over a network")])
     return {**dict.fromkeys(coordinators, MASTER), **{name: i for i, name in enumerate(controllers, 1)}}
 
 

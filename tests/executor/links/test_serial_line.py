@@ -5,6 +5,7 @@ import os
 import pty
 import random
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -212,6 +213,34 @@ def test_a_message_that_no_frame_holds_ends_the_link() -> None:
                         await centre
 
     asyncio.run(main())
+
+
+def test_a_greeting_that_no_frame_holds_ends_the_link_of_whoever_would_give_it() -> None:
+    others = tuple(f"a_station_among_{i:03}_others" for i in range(200))
+
+    async def main(*, at_station: bool) -> None:
+        async with over_a_serial_line() as rig:
+            here, there = rig.link(Greeting("d", (COORDINATOR,))), rig.link(Greeting("d", ("robot",)))
+            failing, other = (there, here) if at_station else (here, there)
+            failing.greeting = Greeting("d", (*failing.greeting.names, *others))
+            standing = asyncio.create_task(other.run(Heard()))
+            with pytest.raises(InputError, match="a greeting with all machines here has"):
+                async with asyncio.timeout(PATIENCE_SECONDS):
+                    await failing.run(Heard())
+            assert not standing.done()
+            standing.cancel()
+            with suppress(asyncio.CancelledError):
+                await standing
+
+    for at_station in (False, True):
+        asyncio.run(main(at_station=at_station))
+
+
+def test_more_controllers_than_addresses_are_refused() -> None:
+    names = tuple(f"c{i}" for i in range(1, 257))
+    assert addresses_on_a_line((COORDINATOR,), names[:-1])["c255"] == 255
+    with pytest.raises(InputError, match="255 addresses for stations, and the cell 256 controllers"):
+        addresses_on_a_line((COORDINATOR,), names)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.0003])
