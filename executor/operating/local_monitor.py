@@ -56,7 +56,9 @@ class LocalMonitor:
         subnets = [decomposition.subnet(name) for name in self.monitors]
         self.owner_of = {place.name: net.name for net in subnets for place in net.places}
         self.owner_of |= {signal.name: net.name for net in subnets for signal in net.signals}
-        self.owner_of |= {transition.name: net.name for net in subnets for transition in net.transitions}
+        # What a coordinator decides alone at one controller bears one name as a row and as a part, and is applied, too.
+        applied = set(self.parts.values())
+        self.owner_of |= {t.name: net.name for net in subnets for t in net.transitions if t.name not in applied}
         self.divergence: Divergence | None = None
 
     def excuse(self, is_held: Callable[[str], bool]) -> None:

@@ -25,7 +25,7 @@ from firable.nets.diagnostics import InputError
 from firable.nets.machines.plant_file import Departure, parse_plant
 from firable.nets.text import parse_net
 from firable.semantics.joining import APPLIED
-from firable.semantics.trace import Event, Fired, Noted, SignalChanged, Trace
+from firable.semantics.trace import CommandSent, Event, Fired, Noted, SignalChanged, Trace
 
 
 @cache
@@ -201,6 +201,47 @@ departures: {station: s}
 machines:
   M: {commands: {GO: {does: work, takes_s: 1}}}
 """
+
+
+COMPETING = """
+firable: 1
+cell: c
+controllers:
+  a: {coordinator: true, start: idle, places: {idle: , at: {send: {machine: M, command: GO}, until: gone}, lent: }}
+  b: {start: idle, places: {idle: , using: }}
+transitions:
+  lend: {from: [a.idle, b.idle], to: [a.lent, b.using]}
+  back: {from: [a.lent, b.using], to: [a.idle, b.idle]}
+  go:   {from: a.idle, to: a.at}
+  gone: {from: a.at, to: a.idle}
+"""
+
+
+@pytest.mark.parametrize("here", [["a"], ["a", "b"]], ids="-".join)
+def test_what_is_decided_of_one_controller_and_applied_beside_its_coordinator_has_fired_once(here: list[str]) -> None:
+    """It competes with a transition of two, so a coordinator decides it; row and part are of one name."""
+    cell = split(parse_net(COMPETING))
+    assert {row.name for row in cell.coordinated} == {"lend", "back", "go", "gone"}
+    monitor = LocalMonitor(cell, here, parse_plant(SHARED_PLANT))
+
+    def decided(at_seconds: float, name: str, *controllers: str) -> None:
+        monitor.seen(Fired(at_seconds, (name,), 1))
+        for one in (one for one in controllers if one in here):
+            monitor.seen(Noted(at_seconds + 0.01, APPLIED, {"controller": one, "round": 1, "transition": name}))
+
+    decided(1.0, "go", "a")
+    monitor.seen(CommandSent(1.02, "a.at"))
+    monitor.seen(SignalChanged(2.02, "a.gone", value=True))
+    decided(2.1, "gone", "a")
+    decided(3.0, "lend", "a", "b")
+    decided(4.0, "back", "a", "b")
+    assert monitor.divergence is None
+    decided(5.0, "go", "a")
+    monitor.seen(SignalChanged(5.02, "a.gone", value=False))
+    monitor.seen(CommandSent(5.02, "a.at"))
+    monitor.passed(9.0)
+    assert monitor.divergence is not None
+    assert monitor.divergence.places == ("a.at",)
 
 
 # --- Hosts
