@@ -299,8 +299,20 @@ class Acts:
             self.recorder.applied(self.now_seconds(), machine, item.round, applied)
             self.left(machine, applied)
             if applied in controller.free:
-                self.standing[machine].discard(applied)
+                self._obeyed(machine, applied, effects, known)
+                return
         self.act(machine, effects, known)
+
+    def _obeyed(self, machine: str, applied: str, effects: list[Effect], known: Collection[int]) -> None:
+        """Take the effects of an order on a vote that stood, which is used from the acknowledgement on and not before.
+
+        An order of a coordinator in a new epoch has all said again first: that is the vote that is used, no new one.
+        """
+        self.standing[machine].add(applied)
+        at = next(i for i, effect in enumerate(effects) if isinstance(effect, Acknowledgement))
+        self.act(machine, effects[:at], known)
+        self.standing[machine].discard(applied)
+        self.act(machine, effects[at:], known)
 
     def _tick(self, machine: str) -> None:
         """Tell a controller the time, and see to it that it is told again when the next of its times is over.

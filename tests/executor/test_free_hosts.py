@@ -18,7 +18,7 @@ from firable.executor.operating.recorder import Recorder
 from firable.executor.protocol.messages import Acknowledgement, Decision, Report, Sending
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Command, Controller, Net, Place, Transition
-from firable.semantics.joining import APPLIED
+from firable.semantics.joining import APPLIED, STANDS
 from firable.semantics.trace import CommandSent, Noted, read_trace
 
 CONVEYOR = ("conveyor",)
@@ -85,6 +85,8 @@ class OneHost:
         self.decomposition: Decomposition = freed(split(_net()))
         assert set(self.decomposition.free) == {(t, c) for t in "GH" for c in "ab"}
         recorder = Recorder(_net(), "", None, machines=("b",))
+        self.noted: list[str] = []
+        recorder.observers.append(lambda event: self.noted.append(event.note) if isinstance(event, Noted) else None)
         self.left: list[tuple[str, str]] = []
         self.acts = Acts(
             self.decomposition,
@@ -104,8 +106,8 @@ class OneHost:
         self.acts.stored()
         return list(self.acts.let_go())
 
-    def order(self, number: int, transition: str) -> None:
-        self.acts.hear("b", Decision("b", number, transition, 0, -1))
+    def order(self, number: int, transition: str, epoch: int = 0) -> None:
+        self.acts.hear("b", Decision("b", number, transition, 0, -1, epoch))
 
     @property
     def marking(self) -> tuple[str, ...]:
@@ -126,6 +128,20 @@ def test_a_halted_host_obeys_no_order_on_votes_that_stand_until_it_goes_on() -> 
     assert [each.place for each in left if isinstance(each, Sending)] == ["b.q"]
     assert any(isinstance(each, Acknowledgement) for each in left)
     assert host.marking == ("b.q",)
+
+
+@pytest.mark.parametrize("is_told", [True, False], ids=["told before", "started anew"])
+def test_a_vote_that_is_said_again_to_a_new_epoch_before_its_order_is_obeyed_is_no_new_one(is_told: bool) -> None:
+    """The first that a restarted coordinator is heard to say may be an order; of two votes one would seem unused."""
+    host = OneHost()
+    host.leaving()
+    assert host.noted == [STANDS]
+    if not is_told:
+        host.acts.standing["b"].clear()
+    host.order(0, "G", epoch=1)
+    said = [each.readiness.transitions for each in host.leaving() if isinstance(each, Report | Acknowledgement)]
+    assert said == [{"G"}, frozenset()]
+    assert host.noted == [STANDS, APPLIED]
 
 
 def test_the_firing_of_a_free_part_gives_up_what_its_tokens_leave_behind() -> None:
