@@ -54,6 +54,9 @@ class LineStream(Protocol):
 
 
 _SHORT: Final = "it is shorter than its journal says; was it changed, or the power cut?"
+_TORN: Final = "its last lines are not text as they were written; was it changed, or the power cut?"
+_TAIL_BYTES: Final = 65_536
+"""So much of a file is looked at before it is gone on with: a power cut leaves its last blocks empty."""
 
 
 class TraceFile:
@@ -74,6 +77,15 @@ class TraceFile:
             if size_bytes and self.file.seek(0, os.SEEK_END) < size_bytes:
                 self.file.close()
                 raise ValueError(_SHORT)
+            if size_bytes and self._is_torn(size_bytes):
+                self.file.close()
+                raise ValueError(_TORN)
+
+    def _is_torn(self, size_bytes: int) -> bool:
+        """Whether no line ends where the file is gone on with, or blocks before that were never written."""
+        begin = self.file.seek(max(size_bytes - _TAIL_BYTES, 0))
+        tail = self.file.read(size_bytes - begin)
+        return not tail.endswith(b"\n") or b"\0" in tail
 
     def _cut(self, size_bytes: int) -> None:
         if stat.S_ISREG(os.fstat(self.file.fileno()).st_mode):  # of a pipe or a device nothing can be cut
@@ -111,7 +123,7 @@ class TraceFile:
             reason = error.strerror if isinstance(error, OSError) else str(error)
             message = f"{printable(str(self.path))}: the trace cannot be written: {reason}"
             hint = "name a file in a folder that you may write to"
-            if reason == _SHORT:
+            if reason in {_SHORT, _TORN}:
                 hint = (
                     "put the trace of this run back as it was, or leave --trace out: it cannot be begun in the middle"
                 )

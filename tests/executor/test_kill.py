@@ -329,6 +329,22 @@ def test_trace_that_has_lost_lines_is_not_gone_on_with(tmp_path: Path) -> None:
     assert "shorter than its journal says" in message
 
 
+@pytest.mark.parametrize("empty", [100, None], ids=["in the middle", "to the end"])
+def test_trace_with_a_block_that_was_never_written_is_not_gone_on_with(tmp_path: Path, empty: int | None) -> None:
+    """As a power cut leaves it: nobody could read what comes behind."""
+    run_here(tmp_path, seconds=20.0)
+    path = tmp_path / "trace.jsonl"
+    told = bytearray(path.read_bytes())
+    half = len(told) // 2
+    end = len(told) if empty is None else half + empty
+    told[half:end] = bytes(end - half)
+    path.write_bytes(told)
+    code, message = refused(tmp_path)
+    assert code == "F1017"
+    assert "its last lines are not text" in message
+    assert path.read_bytes() == told
+
+
 class Failing(MemoryJournal):
     """A journal whose disk is full after some syncs."""
 
