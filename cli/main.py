@@ -163,16 +163,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str]) -> int:
+    streams = sys.stdout, sys.stderr
     try:
         code = firable.main(arguments, prog_name="firable", standalone_mode=False)
         sys.stdout.flush()
     except BrokenPipeError:
-        # Whoever read our output has gone (`firable ... | head`). What is still buffered has no reader.
-        _to_nowhere(sys.stdout)
-        return ExitCode.UNKNOWN
+        return _unread()
+    except SystemExit:
+        if sys.stdout is streams[0]:  # it has told a shell how to complete a line
+            raise
+        sys.stdout, sys.stderr = streams  # click ends so on a broken pipe, by the code of what is violated
+        return _unread()
     except Exception as error:  # the edge of the program: every ending becomes an exit code and a message
         return _ended_by(error, arguments)
     return int(code or 0)
+
+
+def _unread() -> int:
+    """Whoever read our output has gone (`firable ... | head`). What is still buffered has no reader."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except BrokenPipeError:
+            _to_nowhere(stream)
+    return ExitCode.UNKNOWN
 
 
 def _to_nowhere(stream: TextIO) -> None:
