@@ -47,15 +47,26 @@ def read_machines(argument: str) -> PlantModel:
     return read_plant(file)
 
 
+def read_machines_of(argument: str, net: Net) -> PlantModel:
+    """The plant that an argument names, after it was found to be that of the net's cell."""
+    from firable.nets.diagnostics import InputError
+    from firable.nets.machines.plant_file import of_another_cell
+
+    model = read_machines(argument)
+    if problems := of_another_cell(model, net):
+        raise InputError(problems)
+    return model
+
+
 def read_fitting(argument: str, net: Net) -> tuple[str, PlantModel]:
     """The plant that an argument names, with the text of its file, after it was found to fit the net."""
     from firable.nets.diagnostics import InputError
-    from firable.nets.machines.plant_file import SIZE_BYTES_MAX, misfits, parse_plant
+    from firable.nets.machines.plant_file import SIZE_BYTES_MAX, misfits, of_another_cell, parse_plant
     from firable.nets.source import read_source
 
     source = read_source(_plant_file(argument), SIZE_BYTES_MAX)
     model = parse_plant(source.text, source.file)
-    if problems := misfits(model, net):
+    if problems := of_another_cell(model, net) or misfits(model, net):
         raise InputError(problems)
     return source.text, model
 
@@ -88,7 +99,8 @@ def loop_report(
     from firable.nets.machines.plant_file import late_limits
     from firable.nets.verdict import held_to
 
-    loaded, model = load_found(argument), read_machines(machines)
+    loaded = load_found(argument)
+    model = read_machines_of(machines, loaded.net)
     with progress_line(progress) as line:
         with loaded.placing():
             report = check_loop(loaded.net, model, allowed, progress=line)

@@ -12,7 +12,7 @@ import click
 from firable.cli import text
 from firable.cli.files import FOLDER
 from firable.cli.finite import FiniteRange
-from firable.cli.loop import machines_option, read_machines
+from firable.cli.loop import machines_option, read_machines_of
 from firable.cli.options import answer, formats_option, load_net, net_argument, page_option, with_page, write_folder
 from firable.cli.progress import stages
 from firable.cli.protocol import Answered, Asked, ask, protocol_options
@@ -112,7 +112,7 @@ def _report(
         from firable.decompose.proofs.held_gates import held_gates
         from firable.nets.machines.plant_file import late_limits
 
-        model = read_machines(machines)
+        model = read_machines_of(machines, loaded.net)
         held = held_gates(decomposition, model, Budget(seconds=timeout))
         notes += late_limits(model, loaded.net)
         loop = held.loop

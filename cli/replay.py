@@ -157,14 +157,14 @@ def _violated(net: Net, found: Diagnostic) -> Verdict:
 
 
 def _machines(net: Net, trace: Trace, judged: Verdict, argument: str, latency_seconds: float | None) -> Verdict:
-    from firable.cli.loop import read_machines
+    from firable.cli.loop import read_machines_of
     from firable.executor.operating.monitor import LATENCY_SECONDS, Monitor, watch
     from firable.nets.verdict import Status, Verdict
 
     latency = LATENCY_SECONDS if latency_seconds is None else latency_seconds
     name, method = "machines", f"markings of the closed loop that explain what was seen, latency {latency:g} s"
     statement = f"the machines did what '{argument}' allows, as far as signals show"
-    monitor = Monitor(net, read_machines(argument), latency_seconds=latency)
+    monitor = Monitor(net, read_machines_of(argument, net), latency_seconds=latency)
     if bound := _unwatched(trace, judged):
         return Verdict(name, Status.UNKNOWN, statement, method, bound=bound)
     watched, bound = _watched(trace)

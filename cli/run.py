@@ -126,7 +126,7 @@ def run(
     _refuse_combinations(options, served, say=say, speed=speed, step=step, plant=plant, watch=watch)
 
     def make() -> Report:
-        from firable.cli.loop import read_machines
+        from firable.cli.loop import read_machines_of
         from firable.cli.stepping import stepping
         from firable.executor import Watch, load
         from firable.executor.operating.conduct import Conduct
@@ -135,7 +135,7 @@ def run(
         _demand_a_file(trace)
         loaded = load(bundle, trust)
         cell = plant_for(bundle, loaded.net.name) if plant is None and options.is_simulated else plant
-        model = None if cell is None else read_machines(cell)
+        model = None if cell is None else read_machines_of(cell, loaded.net)
         service = served.service(bundle, model)
         pace = 1.0 if options.bind is not None else _SPEEDS[speed]
         stepped: AbstractContextManager[Operator | None] = nullcontext()

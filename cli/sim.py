@@ -88,7 +88,7 @@ def sim(
     """
     import asyncio
 
-    from firable.cli.loop import read_machines
+    from firable.cli.loop import read_machines_of
     from firable.executor.cell.plant import Plant
     from firable.executor.drivers.fitting import misfits as binding_misfits
     from firable.executor.operating.uncut import ended_by_signals
@@ -96,7 +96,7 @@ def sim(
     from firable.nets.machines.plant_file import late_limits, misfits
 
     loaded = load_net(net).net
-    model = read_machines(plant or plant_for(net, loaded.name))
+    model = read_machines_of(plant or plant_for(net, loaded.name), loaded)
     if problems := misfits(model, loaded):
         raise InputError(problems)
     for late in late_limits(model, loaded):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from firable.cli.files import CATALOGUE, READ
-from firable.cli.loop import read_machines
+from firable.cli.loop import read_machines, read_machines_of
 from firable.cli.options import load_net, net_argument, plant_found
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def view(
         runs.append(run)
     playing = Playing(loaded, net, runs, _plant(loaded, net, plant), look)
     if plant is not None and playing.misfit:
-        raise InputError(misfits(read_machines(plant), loaded.net))
+        raise InputError(misfits(read_machines_of(plant, loaded.net), loaded.net))
     editing = editing_of(playing, net, read_only=read_only)
     try:
         asyncio.run(_served(editing, port, open_it=not no_browser))

@@ -20,7 +20,7 @@ from firable.cli.view.site import BODY_BYTES_MAX, PUBLIC, answering, file_routes
 from firable.cli.view.top_view import top_of
 from firable.executor.operating.control import Endpoint, admission
 from firable.nets.loading import Loaded
-from firable.nets.machines.plant_file import PlantModel, misfits
+from firable.nets.machines.plant_file import PlantModel, misfits, of_another_cell
 from firable.nets.verdict import Verdict
 from firable.semantics.player import Player
 
@@ -59,7 +59,7 @@ class Playing:
         """Why there is no top view: no plant file, or one of another cell."""
         if isinstance(self.plant, str):
             return self.plant
-        problems = misfits(self.plant, self.player.net)
+        problems = of_another_cell(self.plant, self.player.net) or misfits(self.plant, self.player.net)
         return problems[0].message if problems else ""
 
     @property

@@ -230,7 +230,7 @@ class PlantModel(_Model):
     """A whole plant file."""
 
     firable_plant: Annotated[Literal[1], BeforeValidator(_version)]
-    plant: Name
+    plant: Name = Field(description="The cell of the net.")
     description: str = ""
     stations: list[Name]
     arrivals: Arrivals
@@ -403,6 +403,19 @@ def _share(probability: float) -> str:
 def misfits(model: PlantModel, net: Net) -> tuple[Diagnostic, ...]:
     """Where a plant does not fit a net (F5003): a command it does not know, a sensor on one side only."""
     return (*_misfits_of_places(model, net), *_misfits_of_signals(model, net))
+
+
+def of_another_cell(model: PlantModel, net: Net) -> tuple[Diagnostic, ...]:
+    """That a plant bears the name of another cell than the net (F5003), whether or not it fits.
+
+    The plant of a twin cell has the same commands and sensors, and other times, stations and faults. It is asked where
+    somebody names both: a net that is made of one, such as that of a host, may bear another name and have its plant.
+    """
+    if model.plant == net.name:
+        return ()
+    message = f"this plant file is for the cell '{model.plant}', and the net is '{net.name}'"
+    hint = f"name the plant file of '{net.name}', or write `plant: {net.name}` when you have looked at all that it says"
+    return (model.misfit(("plant",), ("net",), message, hint),)
 
 
 def late_limits(model: PlantModel, net: Net) -> tuple[Diagnostic, ...]:

@@ -157,6 +157,30 @@ def test_what_does_not_go_together_is_refused(
     assert message in captured.err + captured.out
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("check", CELL, "--machines"),
+        ("prove", CELL, "--machines"),
+        ("bundle", CELL, "-o", "cell.bundle", "--machines"),
+        ("sim", CELL, "--modbus", "--bind", "cell.bind.yaml", "--plant"),
+        ("view", CELL, "--no-browser", "--plant"),
+    ],
+    ids=lambda command: command[0],
+)
+def test_the_plant_file_of_a_twin_cell_is_refused_though_all_the_rest_of_it_fits(
+    command: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = catalogue_path("one_robot").with_name("one_robot.plant.yaml").read_text("utf-8")
+    monkeypatch.chdir(tmp_path)
+    Path("twin.plant.yaml").write_text(text.replace("plant: one-robot", "plant: one-robot-2"), "utf-8")
+    assert main([*command, "twin.plant.yaml"]) == 2
+    told = capsys.readouterr().err
+    assert "twin.plant.yaml:3:8: error[F5003]: this plant file is for the cell 'one-robot-2', and the net is" in told
+    assert "`plant: one-robot`" in told
+    assert [path.name for path in tmp_path.iterdir()] == ["twin.plant.yaml"]
+
+
 def test_a_bundle_that_the_machines_forbid_ends_with_a_report_of_what_is_violated(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
