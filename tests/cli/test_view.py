@@ -237,7 +237,9 @@ def test_the_top_view_shows_workpieces_where_commands_take_them(chromium: Browse
         expect(page.get_by_role("tab", name="Top view", selected=True)).to_be_focused()
         top = page.get_by_role("tabpanel", name="Top view")
         expect(top.locator(".piece")).to_have_count(0)
-        expect(top.locator(".station .spot")).to_have_text(["cv1_entry", "cv1_end", "mc_table", "cv2_entry", "cv2_exit"])
+        expect(top.locator(".station .spot")).to_have_text(
+            ["cv1_entry", "cv1_end", "mc_table", "cv2_entry", "cv2_exit"]
+        )
         page.locator("[data-transition=G1]").click()
         expect(top.locator("[data-machine=CV1]")).to_contain_class("busy")
         expect(top).to_contain_text("CV1: RUN, with a raw workpiece")

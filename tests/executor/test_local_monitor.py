@@ -239,9 +239,9 @@ def test_what_is_decided_of_one_controller_and_applied_beside_its_coordinator_ha
     decided(5.0, "go", "a")
     monitor.seen(SignalChanged(5.02, "a.gone", value=False))
     monitor.seen(CommandSent(5.02, "a.at"))
-    monitor.passed(9.0)
-    assert monitor.divergence is not None
-    assert monitor.divergence.places == ("a.at",)
+    found = monitor.passed(9.0)
+    assert found is not None
+    assert found.places == ("a.at",)
 
 
 # --- Hosts
