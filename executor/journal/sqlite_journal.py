@@ -23,7 +23,7 @@ from __future__ import annotations
 import json
 import os
 import sqlite3
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -43,6 +43,7 @@ _SCHEMA: Final = """
     create table kept (machine text, key text, value text, checked integer, primary key (machine, key)) without rowid;
 """
 
+_NOTHING: Final = "nothing stands in it"
 _Row = tuple[str, str]
 
 
@@ -68,6 +69,9 @@ class SqliteJournal:
         """The generation that is durable: behind `generation` while a sync is under way."""
         self.failed: InputError | None = None
         with _failures(self.path, "opened"):
+            # Until its first checkpoint all that a journal holds is in the file beside it.
+            stands = self.path.exists() and self.path.stat().st_size > 0
+            self.is_copied_alone = stands and not Path(f"{self.path}-wal").exists()
             # One thread at a time uses it, and not always the same.
             self.connection = sqlite3.connect(self.path, timeout=0, isolation_level=None, check_same_thread=False)
         try:
@@ -146,6 +150,8 @@ class SqliteJournal:
         run("begin exclusive")
         tables = {name for (name,) in run("select name from sqlite_master where type = 'table'")}
         if not tables and not self.witness.exists():
+            if self.is_copied_alone:
+                _damaged(self.path, _NOTHING)
             for statement in filter(str.strip, _SCHEMA.split(";")):
                 run(statement)
             header = (FORMAT, digest, json.dumps(self.machines), 0, 0)
@@ -207,7 +213,10 @@ class SqliteJournal:
         elif its_digest != digest:
             message = f"{path}: the journal is of the bundle {str(its_digest)[:12]}, and this one is {digest[:12]}"
         else:
-            message = f"{path}: the journal is of {printable(machines)}, and not of {', '.join(self.machines)}"
+            # The header as it is, where it does not say whose the journal is.
+            with suppress(ValueError, TypeError):
+                machines = _called(json.loads(machines))
+            message = f"{path}: the journal is of {printable(machines)}, and not of {_called(self.machines)}"
         hint = "name another journal, or run the bundle that the journal belongs to"
         raise InputError([Diagnostic("F5031", message, hint)])
 
@@ -224,11 +233,17 @@ def machines_of(path: Path | str) -> tuple[str, ...]:
     """
     path = Path(path)
     with _failures(path, "read"), closing(sqlite3.connect(path, timeout=0)) as connection:
+        if not connection.execute("select count(*) from sqlite_master").fetchone()[0]:
+            _damaged(path, _NOTHING)
         headers = connection.execute("select machines from header").fetchall()
         names = json.loads(headers[0][0]) if len(headers) == 1 and isinstance(headers[0][0], str) else None
         if not isinstance(names, list):
             _damaged(path, "its header is missing")
     return tuple(map(str, names))
+
+
+def _called(machines: Sequence[str]) -> str:
+    return ", ".join(name or "the coordinator" for name in machines)
 
 
 def _damaged(path: Path, what: str) -> NoReturn:
@@ -239,6 +254,8 @@ def _damaged(path: Path, what: str) -> NoReturn:
         "what the cell did last is not known from it: look at the machines and bring the cell to its initial "
         f"marking, then move {files} away (those there are), and start anew"
     )
+    if what == _NOTHING:
+        hint = f"where it was copied without {name}-wal and {name}.generation, copy these, too; else {hint}"
     raise InputError([Diagnostic("F5032", message, hint)])
 
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from support.examples import examples
 
 from firable.executor.journal.journal import Journal, MemoryJournal, sync_now
-from firable.executor.journal.sqlite_journal import SqliteJournal
+from firable.executor.journal.sqlite_journal import SqliteJournal, machines_of
 from firable.executor.protocol.messages import Firing, Keep, Stored
 from firable.nets.diagnostics import InputError
 
@@ -143,7 +143,23 @@ def test_journal_of_other_machines_is_refused(tmp_path: Path) -> None:
     filled(tmp_path).close()
     code, message = refused(lambda: sqlite(tmp_path, machines=("a", "c")))
     assert code == "F5031"
-    assert "not of a, c" in message
+    assert message == f"{tmp_path}/cell.journal: the journal is of a, b, and not of a, c"
+
+
+def test_journal_that_was_copied_without_what_belongs_to_it_is_refused_and_not_begun_anew(tmp_path: Path) -> None:
+    journal = filled(tmp_path)  # open as long as it is copied
+    (tmp_path / "copy").mkdir()
+    shutil.copy(tmp_path / "cell.journal", tmp_path / "copy/cell.journal")
+    reads = (lambda: machines_of(tmp_path / "copy/cell.journal"), lambda: sqlite(tmp_path / "copy"))
+    for read in (*reads, *reads):  # no reading leaves anything behind that the next one would take for a journal
+        with pytest.raises(InputError) as caught:
+            read()
+        (problem,) = caught.value.diagnostics
+        assert problem.code == "F5032"
+        assert problem.message.endswith("nothing stands in it")
+        expected = "where it was copied without cell.journal-wal and cell.journal.generation, copy these, too; else"
+        assert problem.hint.startswith(expected)
+    journal.close()
 
 
 def test_journal_of_a_later_format_is_refused(tmp_path: Path) -> None:
