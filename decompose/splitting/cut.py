@@ -154,7 +154,8 @@ def _problems(net: Net) -> Iterator[Diagnostic]:
             yield Diagnostic(
                 "F2011",
                 several if orphans[1:] else f"'{orphans[0]}' has no owner, so no controller would keep it",
-                "nest what has no owner under one of the `controllers`",
+                "nest what has no owner under one of the `controllers`, or have a file with owners written by "
+                "`firable split NET --own CONTROLLER='PATTERN' -o FILE`",
                 (kind, orphans[0]),
             )
     for kind, named in (("controllers", net.controllers), ("transitions", net.transitions)):

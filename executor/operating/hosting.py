@@ -149,7 +149,10 @@ def _demand_certificates(authority: str, certificate: str, key: str, *, serves: 
         problem = f"{certificate} and {key} are no certificate and its key"
         context.load_cert_chain(certificate, key, password="")  # or one would be asked for at the terminal
     except (OSError, ValueError) as error:  # ssl.SSLError is an OSError
-        message = f"{printable(problem)}: {printable(str(getattr(error, 'reason', None) or error))}"
+        reason = str(getattr(error, "reason", None) or error)
+        if "PEM lib" in reason:  # all that OpenSSL says of it
+            reason = "what stands there is something else; have they changed places?"
+        message = f"{printable(problem)}: {printable(reason)}"
         raise InputError([Diagnostic("F5062", message, "name PEM files, and a key without a password")]) from None
     if fault := fault_of_authority(authority, time.time()):
         message = f"the authority in {printable(authority)} cannot be used: {fault}"

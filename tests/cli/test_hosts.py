@@ -166,6 +166,17 @@ def test_a_certificate_that_has_expired_is_refused_before_it_is_shown(
     )
 
 
+def test_a_certificate_and_its_key_that_have_changed_places_are_told_in_words(
+    bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = Site(tmp_path / "site").host("robot")
+    tls = ["--tls", own.authority, own.key, own.certificate]
+    assert main(["run", bundle, "--controller", "robot", "--dry-run", "1", "--join", "tls/127.0.0.1:1", *tls]) == 2
+    told = capsys.readouterr().err
+    assert "are no certificate and its key: what stands there is something else; have they changed places?" in told
+    assert "PEM lib" not in told
+
+
 def test_hosts_whose_certificates_are_of_two_authorities_are_asked_for_them(bundle: str, tmp_path: Path) -> None:
     at, hosts = f"tls/127.0.0.1:{free_port()}", []
     try:

@@ -86,7 +86,9 @@ def test_net_without_owners_is_refused_with_a_hint(tmp_path: Path, capsys: pytes
     path = tmp_path / "bare.firable.yaml"
     path.write_text("firable: 1\ncell: bare\nplaces: {p: , q: }\nstart: p\ntransitions: {t: {from: p, to: q}}\n")
     assert main(["split", str(path)]) == 2
-    assert "F2011" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "F2011" in told
+    assert "`firable split NET --own CONTROLLER='PATTERN' -o FILE`" in told
 
 
 def test_large_split_is_told_in_part(capsys: pytest.CaptureFixture[str]) -> None:
