@@ -8,7 +8,8 @@ time without a word; the cell would then be commanded again what it has done. So
 - each row carries a check value over its machine, key and value, and the header one over all rows together, their sum,
   so that also a row that is missing, or an old one in the place of a new one, is noticed;
 - each sync counts up the *generation*, in the transaction and, after it, in a small file beside the journal. That file
-  is written and not synced: it can only be behind, and a journal that is behind it has lost what was durable.
+  is written and not synced: it can only be behind, and a journal that is behind it has lost what was durable. It is
+  there before anything stands in the journal: one without it was copied alone, and may have lost anything.
 
 A journal is of one bundle and of certain machines, which its header names; another one's is refused (F5031), as is a
 damaged one (F5032), one that another process has open (F5033), and one that cannot be written (F5034). The file is
@@ -68,10 +69,10 @@ class SqliteJournal:
         self.age = 0
         """The generation that is durable: behind `generation` while a sync is under way."""
         self.failed: InputError | None = None
+        self.witness_descriptor = -1
         with _failures(self.path, "opened"):
-            # Until its first checkpoint all that a journal holds is in the file beside it.
-            stands = self.path.exists() and self.path.stat().st_size > 0
-            self.is_copied_alone = stands and not Path(f"{self.path}-wal").exists()
+            if not self.path.exists() or not self.path.stat().st_size:
+                self._open_witness()  # before anything stands in the journal: of one without it, more is missing
             # One thread at a time uses it, and not always the same.
             self.connection = sqlite3.connect(self.path, timeout=0, isolation_level=None, check_same_thread=False)
         try:
@@ -79,7 +80,7 @@ class SqliteJournal:
                 self._open(digest)
             self.age = self.generation
         except BaseException:
-            self.connection.close()
+            self.close()
             raise
 
     def kept(self, machine: str) -> Mapping[str, Stored]:
@@ -149,9 +150,8 @@ class SqliteJournal:
         run("pragma synchronous = full")
         run("begin exclusive")
         tables = {name for (name,) in run("select name from sqlite_master where type = 'table'")}
-        if not tables and not self.witness.exists():
-            if self.is_copied_alone:
-                _damaged(self.path, _NOTHING)
+        if not tables and self._was_never_stored():
+            self._call_witness()
             for statement in filter(str.strip, _SCHEMA.split(";")):
                 run(statement)
             header = (FORMAT, digest, json.dumps(self.machines), 0, 0)
@@ -160,7 +160,19 @@ class SqliteJournal:
         else:
             run("commit")
             self._read(digest)
-        self.witness_descriptor = os.open(self.witness, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+            self._call_witness()
+
+    def _was_never_stored(self) -> bool:
+        """Whether a journal in which nothing stands is one that was being made, and not what is left of another."""
+        said = self._durable()
+        return said is not None and (not said or (said.isdigit() and not int(said)))
+
+    def _open_witness(self) -> None:
+        if self.witness_descriptor < 0:
+            self.witness_descriptor = os.open(self.witness, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+
+    def _call_witness(self) -> None:
+        self._open_witness()
         self._bear_witness(self.generation)
         os.fsync(self.witness_descriptor)  # once, so that a power cut leaves an older number there, and not none
         _sync_folder(self.path.parent)
@@ -171,6 +183,8 @@ class SqliteJournal:
         if problems:
             _damaged(self.path, problems[0])
         if not run("select count(*) from sqlite_master").fetchone()[0]:
+            if not self.witness.exists():
+                _damaged(self.path, _NOTHING)
             _damaged(self.path, f"it is gone or empty, and {printable(self.witness.name)} beside it tells of one")
         headers = run("select format, digest, machines, generation, total from header").fetchall()
         if len(headers) != 1 or not isinstance(headers[0][3], int):
@@ -187,7 +201,7 @@ class SqliteJournal:
         self.total = sum(self.checks.values())
         if self.total != total:
             _damaged(self.path, "rows are missing, or are older than the others")
-        durable = self._durable()
+        durable = self._durable() or ""
         if not durable.isdigit():
             _damaged(
                 self.path,
@@ -198,10 +212,9 @@ class SqliteJournal:
                 self.path, f"it has lost what was stored: it is at sync {self.generation}, and {int(durable)} were done"
             )
 
-    def _durable(self) -> str:
-        """What the witness says; before the first sync it need not be there, or be written."""
-        said = self.witness.read_text("ascii", "replace").strip() if self.witness.exists() else ""
-        return said or ("" if self.generation else "0")
+    def _durable(self) -> str | None:
+        """What the witness says, if it is there."""
+        return self.witness.read_text("ascii", "replace").strip() if self.witness.exists() else None
 
     def _bear_witness(self, generation: int) -> None:
         os.pwrite(self.witness_descriptor, f"{generation:020}\n".encode(), 0)

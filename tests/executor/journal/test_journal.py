@@ -8,6 +8,7 @@ import sqlite3
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -160,6 +161,26 @@ def test_journal_that_was_copied_without_what_belongs_to_it_is_refused_and_not_b
         expected = "where it was copied without cell.journal-wal and cell.journal.generation, copy these, too; else"
         assert problem.hint.startswith(expected)
     journal.close()
+
+
+@pytest.mark.parametrize("said", ["", f"{0:020}\n"], ids=["witness empty", "witness written"])
+def test_journal_whose_process_was_killed_while_it_was_made_is_begun_again(tmp_path: Path, said: str) -> None:
+    """First there is the witness, then the file, and then what stands in it."""
+    (tmp_path / "cell.journal.generation").write_text(said)
+    with closing(sqlite3.connect(tmp_path / "cell.journal")) as connection:
+        connection.execute("pragma journal_mode = wal")
+    assert (tmp_path / "cell.journal").stat().st_size > 0
+    filled(tmp_path).close()
+    assert sqlite(tmp_path).kept("a") != {}
+
+
+def test_journal_of_which_nothing_was_stored_yet_has_its_witness_or_is_refused(tmp_path: Path) -> None:
+    sqlite(tmp_path).close()  # which puts all into the one file
+    assert (tmp_path / "cell.journal.generation").read_text() == f"{0:020}\n"
+    (tmp_path / "cell.journal.generation").unlink()
+    code, message = refused(lambda: sqlite(tmp_path))
+    assert code == "F5032"
+    assert message.endswith("cell.journal.generation beside it is missing or empty")
 
 
 def test_journal_of_a_later_format_is_refused(tmp_path: Path) -> None:
