@@ -21,6 +21,7 @@ from firable.cli.options import (
     analysis_options,
     answer_all,
     budget,
+    demand_bound,
     formats_option,
     is_given,
     load_found,
@@ -118,6 +119,12 @@ class _Asked:
     type=WRITTEN_NET,
     help="Write the net that NET and its --machines are together, as a net file (*.firable.yaml).",
 )
+@click.option(
+    "--bind",
+    metavar="BIND",
+    type=READ,
+    help="Also refuse a binding that is not one of NET: each signal and command is bound, and nothing else.",
+)
 @page_option
 @click.option(
     "--no-cache", is_flag=True, help="Decide anew what was decided before of the same net; see FIRABLE_CACHE."
@@ -138,6 +145,7 @@ def check(
     query_texts: tuple[str, ...],
     machines: str | None,
     loop_file: str | None,
+    bind: str | None,
     page: str | None,
     no_cache: bool,
     progress: bool | None,
@@ -160,19 +168,22 @@ def check(
     nets = net_files(nets)
     if page is not None and len(nets) > 1:
         raise click.UsageError("--report is a page on one net: name one NET")
+    if bind is not None and len(nets) > 1:
+        raise click.UsageError("--bind is a binding of one net: name one NET")
     if machines is not None:
         _refuse_beside_machines()
         many = len(nets) > 1
         closed = []
         for net in nets:
             folder = None if evidence_dir is None else _folder(evidence_dir, net, many=many)
-            make = partial(loop_report, net, machines, allowed, loop_file, folder, progress=progress)
+            make = partial(loop_report, net, machines, allowed, loop_file, folder, bind=bind, progress=progress)
             closed.append(with_page(make, page))
         return answer_all("check", format_, closed, partial(show_loop, verbose=verbose))
     if loop_file is not None:
         raise click.UsageError("--loop-net goes with --machines")
     asked = _Asked(discipline, method, allowed, trace_dir, structure, not no_cache, query_file, query_texts, progress)
-    makers = [with_page(partial(_report, net, asked, evidence_dir, many=len(nets) > 1), page) for net in nets]
+    many = len(nets) > 1
+    makers = [with_page(partial(_report, net, asked, evidence_dir, bind=bind, many=many), page) for net in nets]
     return answer_all("check", format_, makers, partial(_show, verbose=verbose))
 
 
@@ -189,12 +200,13 @@ def _refuse_beside_machines() -> None:
     demand_a_net_file(context.params["loop_file"])
 
 
-def _report(argument: str, asked: _Asked, evidence_dir: str | None, *, many: bool) -> Report:
+def _report(argument: str, asked: _Asked, evidence_dir: str | None, *, bind: str | None, many: bool) -> Report:
     from firable.cli.cache import key_of, opened_cache
     from firable.nets.verdict import held_to
 
     loaded = load_found(argument)
     net = loaded.net
+    demand_bound(bind, net)
     queries = _queries(loaded, asked)
     cache = opened_cache() if asked.cached else None
     key = key_of(net, asked.of_the_net(queries)) if cache is not None else ""

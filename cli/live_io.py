@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from firable.executor.drivers.bound import BoundDriver
     from firable.executor.drivers.bound_device import ByHand
     from firable.executor.drivers.driver import Reading
-    from firable.nets.net import Place
+    from firable.nets.net import Net, Place
 
 _REFRESH_SECONDS = 0.25
 _ENDED = "the emergency stop has ended the sending"
@@ -45,7 +45,7 @@ _COLOURS = {"good": "green", "uncertain": "yellow", "bad": "red"}
     show_default=True,
     help="How to print: as a table, or one JSON document a line; `firable schema io` prints its schema.",
 )
-@click.option("--net", "of", metavar="NET", type=READ, help="The net, or the bundle, whose commands are sent.")
+@click.option("--net", "of", metavar="NET", type=READ, help="The net, or the bundle, that BIND must be a binding of.")
 def live_io(
     bind: str,
     once: bool,
@@ -77,6 +77,7 @@ def live_io(
     import asyncio
 
     from firable.executor.drivers.binding import read_binding
+    from firable.executor.drivers.fitting import misfits
     from firable.executor.operating.uncut import ended_by_signals
     from firable.nets.diagnostics import InputError
 
@@ -88,7 +89,10 @@ def live_io(
     forced = [_forced(binding, text) for text in force]
     if both := [signal for signal, value in forced if (signal, not value) in forced]:
         raise click.UsageError(f"'{both[0]}' is forced to 0 and to 1: name it once")
-    places = _sent(binding, send, of)
+    net = None if of is None else load_net(of).net
+    if net is not None and (problems := misfits(binding, net)):
+        raise InputError(problems)
+    places = _sent(binding, send, net)
     heard = _Heard() if format_ == "text" else _HeardByPrograms(bind)
 
     async def ended() -> int:
@@ -124,20 +128,12 @@ def _forced(binding: Binding, text: str) -> tuple[str, bool]:
     return name, value == "1"
 
 
-def _sent(binding: Binding, names: tuple[str, ...], of: str | None) -> list[Place]:
+def _sent(binding: Binding, names: tuple[str, ...], net: Net | None) -> list[Place]:
     """The places whose commands are to be sent, if the binding allows it."""
-    from firable.executor.drivers.fitting import misfits
-    from firable.nets.diagnostics import InputError
-
     if not names:
-        if of is not None:
-            raise click.UsageError("--net is about the commands that are sent: name one with --send")
         return []
-    if of is None:
+    if net is None:
         raise click.UsageError("say with --net whose commands --send is about")
-    net = load_net(of).net
-    if problems := misfits(binding, net):
-        raise InputError(problems)
     for name in names:
         if name not in binding.document.commands:
             raise click.UsageError(f"no command of '{name}' is bound")

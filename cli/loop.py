@@ -16,7 +16,7 @@ from firable.cli import text
 from firable.cli.evidence_files import is_evidence
 from firable.cli.files import CATALOGUE, READ
 from firable.cli.net_files import is_schema, schema_told, write_net
-from firable.cli.options import catalogue_file, load_found, write_folder
+from firable.cli.options import catalogue_file, demand_bound, load_found, write_folder
 from firable.cli.progress import progress_line
 from firable.cli.report import Report
 
@@ -87,6 +87,7 @@ def loop_report(
     loop_file: str | None,
     evidence_dir: str | None,
     *,
+    bind: str | None,
     progress: bool | None,
 ) -> Report:
     """The report on one net with its machines; the evidence on each of its loops goes into a folder.
@@ -100,6 +101,7 @@ def loop_report(
     from firable.nets.verdict import held_to
 
     loaded = load_found(argument)
+    demand_bound(bind, loaded.net)
     model = read_machines_of(machines, loaded.net)
     with progress_line(progress) as line:
         with loaded.placing():

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from firable.analysis.spaces.reachability import Budget
     from firable.nets.diagnostics import Diagnostic
     from firable.nets.loading import Loaded
+    from firable.nets.net import Net
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -96,6 +97,17 @@ def with_page(make: Callable[[], Report], path: str | None) -> Callable[[], Repo
         return report
 
     return make_both
+
+
+def demand_bound(bind: str | None, net: Net) -> None:
+    """Raise `InputError` (F5101, F5102) where a binding is named that binds less than the net, or more."""
+    if bind is not None:
+        from firable.executor.drivers.binding import read_binding
+        from firable.executor.drivers.fitting import misfits
+        from firable.nets.diagnostics import InputError
+
+        if problems := misfits(read_binding(bind), net):
+            raise InputError(problems)
 
 
 def is_given(name: str) -> bool:

@@ -164,11 +164,37 @@ def test_devices_that_do_not_answer_are_waited_for_together_and_each_is_named(
     assert [name for name in names if f"{name}: not connected: /dev/nobody-is-here: " not in said.err] == []
 
 
-def test_a_net_whose_commands_are_not_sent_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("check", "catalogue:one_robot", "--bind"),
+        ("check", "catalogue:one_robot", "--machines", "catalogue:one_robot", "--bind"),
+        ("io", "--once", "--net", "catalogue:one_robot"),
+    ],
+    ids=["check", "check with machines", "io"],
+)
+def test_a_binding_is_held_against_its_net_without_a_device(
+    command: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bind = tmp_path / "c.bind.yaml"
+    text = binding_text(NET, {"modbus": str(free_port())}, SENSORS)
+    bind.write_text(text.replace("host: 127.0.0.1", "host: 127.0.0.1\n    start_s: 0.2"))
+    fits = main([*command, str(bind)])
+    assert fits == (3 if "io" in command else 0), "nobody is there, and that it fits is no matter of that"
+    assert "F5101" not in capsys.readouterr().err
+    lines = bind.read_text().splitlines(keepends=True)
+    bind.write_text("".join(line for line in lines if not line.startswith("  mc.part_present:")))
+    assert main([*command, str(bind)]) == 2
+    said = capsys.readouterr()
+    assert "error[F5101]: the signal 'mc.part_present' is not bound" in said.err
+    assert "must hold" not in said.out
+
+
+def test_a_binding_is_of_one_net(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bind = tmp_path / "c.bind.yaml"
     bind.write_text(binding_text(NET, {"modbus": str(free_port())}, SENSORS))
-    assert main(["io", str(bind), "--once", "--net", "catalogue:one_robot"]) == 2
-    assert "--net is about the commands that are sent: name one with --send" in capsys.readouterr().err
+    assert main(["check", "catalogue:one_robot", "catalogue:two_cells", "--bind", str(bind)]) == 2
+    assert "--bind is a binding of one net: name one NET" in capsys.readouterr().err
 
 
 def test_what_cannot_be_read_is_told_and_unknown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
