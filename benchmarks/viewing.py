@@ -22,7 +22,8 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any, Final
 
 from measuring import Table, against
@@ -88,12 +89,8 @@ def seen(command_seconds: float) -> Mapping[str, Any]:
     """What a browser saw of such a run in `SECONDS`."""
     from playwright.sync_api import sync_playwright
 
-    served = [sys.executable, __file__, str(command_seconds)]
-    with subprocess.Popen(served, stdout=subprocess.PIPE, text=True) as process, sync_playwright() as playwright:
-        assert process.stdout is not None
-        address = process.stdout.readline().strip()
-        chromium = shutil.which("chromium") or shutil.which("google-chrome")
-        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+    with served(command_seconds) as address, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=_chromium(), args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": 1400, "height": 900})
         page.add_init_script(COUNTING)
         page.goto(address)
@@ -106,8 +103,25 @@ def seen(command_seconds: float) -> Mapping[str, Any]:
         found = page.evaluate(READ)
         found["happened"] = page.evaluate(counted % TOKEN) - before
         browser.close()
-        process.kill()
     return dict(found)
+
+
+@contextmanager
+def served(command_seconds: float) -> Iterator[str]:
+    """The address of such a run, in a process of its own, which ends whatever happens to who looks at it."""
+    command = [sys.executable, __file__, str(command_seconds)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        try:
+            yield process.stdout.readline().strip()
+        finally:
+            process.kill()
+
+
+def _chromium() -> str | None:
+    """The browser of the system, as the tests have it; None lets Playwright take its own."""
+    found = map(shutil.which, ("chromium-headless-shell", "chromium", "google-chrome"))
+    return next(filter(None, found), None)
 
 
 def tables(repeat: int) -> list[Table]:
