@@ -165,19 +165,19 @@ class Strangers:
 class _Complaints(logging.Handler):
     """What aiohttp has to say of requests, which it would write to the terminal with all its calls.
 
-    A request that is none comes from a stranger; an error in answering one is the event loop's to tell.
+    What is no request, in head or body, comes from a stranger; an error in answering one is the event loop's to tell.
     """
 
     def __init__(self, strangers: Strangers) -> None:
-        super().__init__(logging.ERROR)
+        super().__init__()
         self.strangers = strangers
 
     def emit(self, record: logging.LogRecord) -> None:
         error = record.exc_info[1] if record.exc_info else None
-        if isinstance(error, HttpProcessingError):
+        if isinstance(error, HttpProcessingError | web.RequestPayloadError):
             by = record.args[0] if isinstance(record.args, tuple) and record.args else None
             self.strangers.turned_away("what is no request", None if by is None else str(by))
-        else:
+        elif record.levelno >= logging.ERROR:
             asyncio.get_running_loop().call_exception_handler({"message": record.getMessage(), "exception": error})
 
 

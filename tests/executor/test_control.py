@@ -202,26 +202,48 @@ def test_a_stranger_fills_no_trace() -> None:
 
 
 async def sent_raw(url: str, request: bytes) -> bytes:
-    """The first line of the answer to these bytes."""
+    """The status of the answer to these bytes."""
     reader, writer = await asyncio.open_connection("127.0.0.1", int(url.rpartition(":")[2]))
-    writer.write(request + b"\r\nHost: cell\r\nContent-Length: 0\r\n\r\n")
+    writer.write(request)
     try:
-        return await reader.readline()
+        said = (await reader.readline()).split()
+        await reader.read()  # until the other side has dealt with all of it
+        return said[1]
     finally:
         writer.close()
 
 
-def test_what_is_no_request_or_no_text_lets_nobody_in_and_writes_on_no_terminal(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    async def ask(_session: ClientSession, url: str) -> None:
-        no_text = b"POST /stop HTTP/1.1\r\nAuthorization: Bearer \xff\xfe"
-        assert await sent_raw(url, no_text) == b"HTTP/1.1 401 Unauthorized\r\n"
-        for _ in range(3):
-            assert await sent_raw(url, b"POST /st\xff HTTP/1.1") == b"HTTP/1.0 400 Bad Request\r\n"
+HEAD = b"POST /stop HTTP/1.1\r\nHost: cell\r\nConnection: close\r\n"
 
-    told = with_endpoint(Endpoint("127.0.0.1", 0, TOKEN), ask)
-    assert told == ["127.0.0.1: /stop not let in", "127.0.0.1: what is no request not let in"]
+
+@pytest.mark.parametrize(
+    ("request_", "status", "told"),
+    [
+        (HEAD + b"Authorization: Bearer \xff\xfe\r\n\r\n", b"401", ["/stop"]),
+        (HEAD.replace(b"/stop", b"/st\xff") + b"\r\n", b"400", ["what is no request"]),
+        (b"\x16\x03\x01\x02\x00\x01\x00\r\n\r\n", b"400", ["what is no request"]),
+        (b"SSH-2.0-scanner\r\n\r\n", b"400", ["what is no request"]),
+        (
+            HEAD + b"Content-Encoding: deflate\r\nContent-Length: 8\r\n\r\nno flate",
+            b"401",
+            ["/stop", "what is no request"],
+        ),
+    ],
+    ids=["token", "address", "tls", "ssh", "body"],
+)
+def test_what_is_no_request_or_no_text_lets_nobody_in_and_is_told_of_once(
+    request_: bytes, status: bytes, told: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    left: list[object] = []
+
+    async def ask(_session: ClientSession, url: str) -> None:
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: left.append(context))
+        for _ in range(3):
+            assert await sent_raw(url, request_) == status
+
+    lines = with_endpoint(Endpoint("127.0.0.1", 0, TOKEN), ask)
+    assert [line.partition(": ")[2] for line in lines] == [f"{one} not let in" for one in told]
+    assert left == []
     assert capsys.readouterr() == ("", "")
 
 
