@@ -9,7 +9,8 @@ time without a word; the cell would then be commanded again what it has done. So
   so that also a row that is missing, or an old one in the place of a new one, is noticed;
 - each sync counts up the *generation*, in the transaction and, after it, in a small file beside the journal. That file
   is written and not synced: it can only be behind, and a journal that is behind it has lost what was durable. It is
-  there before anything stands in the journal: one without it was copied alone, and may have lost anything.
+  there before anything stands in the journal, empty until all of that is made, and synced once then: a journal without
+  it was copied alone, and may have lost anything.
 
 A journal is of one bundle and of certain machines, which its header names; another one's is refused (F5031), as is a
 damaged one (F5032), one that another process has open (F5033), and one that cannot be written (F5034). The file is
@@ -44,7 +45,6 @@ _SCHEMA: Final = """
     create table kept (machine text, key text, value text, checked integer, primary key (machine, key)) without rowid;
 """
 
-_NOTHING: Final = "nothing stands in it"
 _Row = tuple[str, str]
 
 
@@ -71,12 +71,13 @@ class SqliteJournal:
         self.failed: InputError | None = None
         self.witness_descriptor = -1
         with _failures(self.path, "opened"):
-            if not self.path.exists() or not self.path.stat().st_size:
-                self._open_witness()  # before anything stands in the journal: of one without it, more is missing
+            is_new = not self.path.exists() or not self.path.stat().st_size
             # One thread at a time uses it, and not always the same.
             self.connection = sqlite3.connect(self.path, timeout=0, isolation_level=None, check_same_thread=False)
         try:
             with _failures(self.path, "opened"):
+                if is_new:
+                    self._open_witness()
                 self._open(digest)
             self.age = self.generation
         except BaseException:
@@ -142,6 +143,7 @@ class SqliteJournal:
         self.connection.close()
         with suppress(OSError):
             os.close(self.witness_descriptor)
+        self.witness_descriptor = -1
 
     def _open(self, digest: str) -> None:
         run = self.connection.execute
@@ -150,8 +152,7 @@ class SqliteJournal:
         run("pragma synchronous = full")
         run("begin exclusive")
         tables = {name for (name,) in run("select name from sqlite_master where type = 'table'")}
-        if not tables and self._was_never_stored():
-            self._call_witness()
+        if not tables and self._durable() == "":  # it was being made, if not now
             for statement in filter(str.strip, _SCHEMA.split(";")):
                 run(statement)
             header = (FORMAT, digest, json.dumps(self.machines), 0, 0)
@@ -160,22 +161,14 @@ class SqliteJournal:
         else:
             run("commit")
             self._read(digest)
-            self._call_witness()
-
-    def _was_never_stored(self) -> bool:
-        """Whether a journal in which nothing stands is one that was being made, and not what is left of another."""
-        said = self._durable()
-        return said is not None and (not said or (said.isdigit() and not int(said)))
-
-    def _open_witness(self) -> None:
-        if self.witness_descriptor < 0:
-            self.witness_descriptor = os.open(self.witness, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
-
-    def _call_witness(self) -> None:
         self._open_witness()
         self._bear_witness(self.generation)
         os.fsync(self.witness_descriptor)  # once, so that a power cut leaves an older number there, and not none
         _sync_folder(self.path.parent)
+
+    def _open_witness(self) -> None:
+        if self.witness_descriptor < 0:
+            self.witness_descriptor = os.open(self.witness, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
 
     def _read(self, digest: str) -> None:
         run = self.connection.execute
@@ -183,9 +176,8 @@ class SqliteJournal:
         if problems:
             _damaged(self.path, problems[0])
         if not run("select count(*) from sqlite_master").fetchone()[0]:
-            if not self.witness.exists():
-                _damaged(self.path, _NOTHING)
-            _damaged(self.path, f"it is gone or empty, and {printable(self.witness.name)} beside it tells of one")
+            told = f"it is gone or empty, and {printable(self.witness.name)} beside it tells of one"
+            _damaged(self.path, told if self.witness.exists() else _NOTHING, is_alone=True)
         headers = run("select format, digest, machines, generation, total from header").fetchall()
         if len(headers) != 1 or not isinstance(headers[0][3], int):
             _damaged(self.path, "its header is missing")
@@ -201,12 +193,12 @@ class SqliteJournal:
         self.total = sum(self.checks.values())
         if self.total != total:
             _damaged(self.path, "rows are missing, or are older than the others")
-        durable = self._durable() or ""
-        if not durable.isdigit():
-            _damaged(
-                self.path,
-                f"{printable(self.witness.name)} beside it is {'no number' if durable else 'missing or empty'}",
-            )
+        durable = self._durable()
+        if durable == "" and not self.generation:  # the process ended when all was made, and nothing stored
+            return
+        if not durable or not durable.isdigit():
+            told = f"{printable(self.witness.name)} beside it is {'no number' if durable else 'missing or empty'}"
+            _damaged(self.path, told, is_alone=durable is None)
         if int(durable) > self.generation:
             _damaged(
                 self.path, f"it has lost what was stored: it is at sync {self.generation}, and {int(durable)} were done"
@@ -247,7 +239,7 @@ def machines_of(path: Path | str) -> tuple[str, ...]:
     path = Path(path)
     with _failures(path, "read"), closing(sqlite3.connect(path, timeout=0)) as connection:
         if not connection.execute("select count(*) from sqlite_master").fetchone()[0]:
-            _damaged(path, _NOTHING)
+            _damaged(path, _NOTHING, is_alone=True)
         headers = connection.execute("select machines from header").fetchall()
         names = json.loads(headers[0][0]) if len(headers) == 1 and isinstance(headers[0][0], str) else None
         if not isinstance(names, list):
@@ -259,7 +251,10 @@ def _called(machines: Sequence[str]) -> str:
     return ", ".join(name or "the coordinator" for name in machines)
 
 
-def _damaged(path: Path, what: str) -> NoReturn:
+_NOTHING: Final = "nothing stands in it"
+
+
+def _damaged(path: Path, what: str, *, is_alone: bool = False) -> NoReturn:
     message = f"{printable(str(path))}: the journal is damaged: {what}"
     name = printable(path.name)
     files = f"{name}, {name}-wal, {name}.generation and {name}.cell"
@@ -267,7 +262,7 @@ def _damaged(path: Path, what: str) -> NoReturn:
         "what the cell did last is not known from it: look at the machines and bring the cell to its initial "
         f"marking, then move {files} away (those there are), and start anew"
     )
-    if what == _NOTHING:
+    if is_alone:
         hint = f"where it was copied without {name}-wal and {name}.generation, copy these, too; else {hint}"
     raise InputError([Diagnostic("F5032", message, hint)])
 

@@ -163,15 +163,30 @@ def test_journal_that_was_copied_without_what_belongs_to_it_is_refused_and_not_b
     journal.close()
 
 
-@pytest.mark.parametrize("said", ["", f"{0:020}\n"], ids=["witness empty", "witness written"])
-def test_journal_whose_process_was_killed_while_it_was_made_is_begun_again(tmp_path: Path, said: str) -> None:
-    """First there is the witness, then the file, and then what stands in it."""
-    (tmp_path / "cell.journal.generation").write_text(said)
+def test_journal_whose_process_was_killed_while_it_was_made_is_begun_again(tmp_path: Path) -> None:
+    """First there is the witness, empty, then the file, then what stands in it, and then a number in the witness."""
+    (tmp_path / "cell.journal.generation").touch()
     with closing(sqlite3.connect(tmp_path / "cell.journal")) as connection:
         connection.execute("pragma journal_mode = wal")
     assert (tmp_path / "cell.journal").stat().st_size > 0
+    sqlite(tmp_path).close()
+    (tmp_path / "cell.journal.generation").write_text("")
     filled(tmp_path).close()
     assert sqlite(tmp_path).kept("a") != {}
+
+
+def test_journal_that_lost_its_log_is_not_begun_again_where_a_power_cut_has_set_its_witness_back(
+    tmp_path: Path,
+) -> None:
+    """Only the first number of it is synced."""
+    journal = filled(tmp_path)
+    (tmp_path / "copy").mkdir()
+    shutil.copy(tmp_path / "cell.journal", tmp_path / "copy/cell.journal")
+    (tmp_path / "copy/cell.journal.generation").write_text(f"{0:020}\n")
+    code, message = refused(lambda: sqlite(tmp_path / "copy"))
+    assert code == "F5032"
+    assert message.endswith("it is gone or empty, and cell.journal.generation beside it tells of one")
+    journal.close()
 
 
 def test_journal_of_which_nothing_was_stored_yet_has_its_witness_or_is_refused(tmp_path: Path) -> None:
@@ -343,9 +358,14 @@ def test_write_that_fails_ends_the_journal(tmp_path: Path) -> None:
 def test_journal_without_the_file_beside_it_is_refused(tmp_path: Path) -> None:
     filled(tmp_path).close()
     (tmp_path / "cell.journal.generation").unlink()
-    code, message = refused(lambda: sqlite(tmp_path))
-    assert code == "F5032"
-    assert message.endswith("cell.journal.generation beside it is missing or empty")
+    with pytest.raises(InputError) as caught:
+        sqlite(tmp_path)
+    (problem,) = caught.value.diagnostics
+    assert problem.code == "F5032"
+    assert problem.message.endswith("cell.journal.generation beside it is missing or empty")
+    assert problem.hint.startswith(
+        "where it was copied without cell.journal-wal and cell.journal.generation, copy these"
+    )
 
 
 def test_a_journal_that_is_gone_while_the_file_beside_it_is_there_is_refused_in_these_words(tmp_path: Path) -> None:
