@@ -19,7 +19,7 @@ from firable.executor.operating.conduct import UNATTENDED, Conduct, Watch
 from firable.executor.operating.host import Host
 from firable.executor.operating.local_monitor import LocalMonitor
 from firable.executor.operating.monitor import Divergence
-from firable.executor.operating.own_certificate import fault_of, fault_of_authority
+from firable.executor.operating.own_certificate import fault_of, fault_of_authority, unloaded
 from firable.executor.operating.service import figures_for, patience_with, run_to_the_end
 from firable.executor.operating.situation import Situation
 from firable.executor.operating.taken_up import opened
@@ -143,16 +143,13 @@ def _demand_certificates(authority: str, certificate: str, key: str, *, serves: 
     for file in (authority, certificate, key):
         read_bytes(file, CERTIFICATE_BYTES_MAX)
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-    problem = f"{authority} is no certificate of an authority"
+    problem, files = f"{authority} is no certificate of an authority", [authority]
     try:
         context.load_verify_locations(authority)
-        problem = f"{certificate} and {key} are no certificate and its key"
+        problem, files = f"{certificate} and {key} are no certificate and its key", [certificate, key]
         context.load_cert_chain(certificate, key, password="")  # or one would be asked for at the terminal
     except (OSError, ValueError) as error:  # ssl.SSLError is an OSError
-        reason = str(getattr(error, "reason", None) or error)
-        if "PEM lib" in reason:  # all that OpenSSL says of it
-            reason = "what stands there is something else; have they changed places?"
-        message = f"{printable(problem)}: {printable(reason)}"
+        message = f"{printable(problem)}: {printable(unloaded(error, *files))}"
         raise InputError([Diagnostic("F5062", message, "name PEM files, and a key without a password")]) from None
     if fault := fault_of_authority(authority, time.time()):
         message = f"the authority in {printable(authority)} cannot be used: {fault}"

@@ -14,20 +14,27 @@ from typing import Final
 
 from firable.nets.source import printable
 
+_BYTES_MAX: Final = 1 << 20
 _FLIGHTS_MAX: Final = 8
 """A handshake has fewer; one that comes to no end shows nothing."""
 
 
 def unloaded(error: OSError | ValueError, *files: str) -> str:
-    """Why files of a certificate, a key or an authority could not be loaded."""
+    """Why the files of a certificate and its key, or of an authority, could not be loaded."""
+    texts = []
     for file in files:
         try:
-            with Path(file).open("rb"):
-                pass
+            with Path(file).open("rb") as opened:
+                texts.append(opened.read(_BYTES_MAX))
         except (OSError, ValueError) as found:  # ValueError: a NUL in the path
             return f"{printable(file)}: {found.strerror if isinstance(found, OSError) else found}"
     if isinstance(error, ssl.SSLError):
-        return "the key is that of another certificate" if error.reason == "KEY_VALUES_MISMATCH" else "it is not in PEM"
+        if error.reason == "KEY_VALUES_MISMATCH":
+            return "the key is that of another certificate"
+        holds = [(b"BEGIN CERTIFICATE" in text, b"PRIVATE KEY" in text) for text in texts]
+        if holds == [(False, True), (True, False)]:
+            return "certificate and key have changed places"
+        return "the key has a password" if any(b"ENCRYPTED" in text for text in texts) else "it is not in PEM"
     return (error.strerror if isinstance(error, OSError) else None) or str(error)
 
 

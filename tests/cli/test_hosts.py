@@ -6,14 +6,18 @@ import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from cryptography.hazmat.primitives import serialization
 from support.certificates import Site
 from support.waiting import PATIENCE_SECONDS, heard_in_time, until
 
 from firable.cli.main import main
 from firable.executor.drivers.far_side.ports import free_port
+from firable.executor.links.zenoh_link import Certificates
 
 
 @pytest.fixture(scope="module")
@@ -166,15 +170,42 @@ def test_a_certificate_that_has_expired_is_refused_before_it_is_shown(
     )
 
 
-def test_a_certificate_and_its_key_that_have_changed_places_are_told_in_words(
-    bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def changed_places(own: Certificates) -> Certificates:
+    return replace(own, certificate=own.key, key=own.certificate)
+
+
+def with_a_password(own: Certificates) -> Certificates:
+    key = serialization.load_pem_private_key(Path(own.key).read_bytes(), None)
+    form = serialization.PrivateFormat.PKCS8, serialization.BestAvailableEncryption(b"secret")
+    Path(own.key).write_bytes(key.private_bytes(serialization.Encoding.PEM, *form))
+    return own
+
+
+def without_text(own: Certificates) -> Certificates:
+    Path(own.key).write_bytes(b"\x30\x82\x01")
+    return own
+
+
+@pytest.mark.parametrize(
+    ("made", "said"),
+    [
+        (changed_places, "certificate and key have changed places"),
+        (with_a_password, "the key has a password"),
+        (without_text, "it is not in PEM"),
+    ],
+    ids=lambda value: getattr(value, "__name__", ""),
+)
+def test_why_a_certificate_and_its_key_cannot_be_used_is_told_in_words(
+    made: Callable[[Certificates], Certificates],
+    said: str,
+    bundle: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    own = Site(tmp_path / "site").host("robot")
-    tls = ["--tls", own.authority, own.key, own.certificate]
+    own = made(Site(tmp_path / "site").host("robot"))
+    tls = ["--tls", own.authority, own.certificate, own.key]
     assert main(["run", bundle, "--controller", "robot", "--dry-run", "1", "--join", "tls/127.0.0.1:1", *tls]) == 2
-    told = capsys.readouterr().err
-    assert "are no certificate and its key: what stands there is something else; have they changed places?" in told
-    assert "PEM lib" not in told
+    assert f"are no certificate and its key: {said}" in capsys.readouterr().err
 
 
 def test_hosts_whose_certificates_are_of_two_authorities_are_asked_for_them(bundle: str, tmp_path: Path) -> None:
