@@ -123,7 +123,7 @@ class _Asked:
     "--bind",
     metavar="BIND",
     type=READ,
-    help="Also refuse a binding that is not one of NET: each signal and command is bound, and nothing else.",
+    help="Also demand of a binding that it fits NET: each signal and command is bound, and nothing else.",
 )
 @page_option
 @click.option(

@@ -100,7 +100,7 @@ def with_page(make: Callable[[], Report], path: str | None) -> Callable[[], Repo
 
 
 def demand_bound(bind: str | None, net: Net) -> None:
-    """Raise `InputError` (F5101, F5102) where a binding is named that binds less than the net, or more."""
+    """Raise `InputError` (F5101, F5102) where a binding is named that does not fit the net."""
     if bind is not None:
         from firable.executor.drivers.binding import read_binding
         from firable.executor.drivers.fitting import misfits

@@ -37,10 +37,13 @@ from firable.executor.protocol.messages import Message
 from firable.executor.reasons import port_reason
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.interchange import canonical_json
+from firable.nets.source import printable
 
 MASTER: Final = 0
 STATIONS_MAX: Final = 255
 """An address is a byte."""
+GREETING_BYTES_MAX: Final = PAYLOAD_BYTES_MAX - 3072
+"""Who a host is, as far as it does not grow: the rest of the frame is for what is remembered (`storages.LIVES_MAX`)."""
 LEASE_SECONDS: Final = 1.0
 ANSWER_SECONDS: Final = 0.05
 """How long a station may take to begin its answer."""
@@ -101,7 +104,10 @@ class _Peer:
 
 
 class SerialLink:
-    """One end of the line; `addresses` says at which address each machine is, and `own` which address this host has."""
+    """One end of the line; `addresses` says at which address each machine is, and `own` which address this host has.
+
+    Raises `InputError` F5021 where the names of its machines are too long for a greeting.
+    """
 
     def __init__(
         self,
@@ -122,6 +128,10 @@ class SerialLink:
         self.lease_seconds = lease_seconds
         self.answer_seconds = answer_seconds
         self.instance = os.urandom(8).hex()
+        if (size_bytes := len(_payload(_Said(greeting, self.instance)))) > GREETING_BYTES_MAX:
+            message = f"the link {printable(port)} cannot be opened: to say who this host is takes {size_bytes:,} bytes"
+            hint = "run fewer controllers on this host, or link the hosts over a network"
+            raise InputError([Diagnostic("F5021", f"{message}, and there are {GREETING_BYTES_MAX:,}", hint)])
         self.standing = Standing.GOING
         others = sorted({a for a in addresses.values() if a != own}) if own == MASTER else [MASTER]
         self.peers = {address: _Peer() for address in others}
@@ -265,13 +275,7 @@ class SerialLink:
             memory = self._tell().memory
             known = {name: str(met) for name, met in memory.known.items() if self.addresses.get(name) == to}
             said = _Said(self.greeting, self.instance, str(memory.storage), known)
-            payload = canonical_json(_SAID.dump_python(said, mode="json"))
-            if len(payload) > PAYLOAD_BYTES_MAX:
-                raise has_failed(
-                    self.port,
-                    f"a greeting with all machines here has {len(payload):,} bytes, and a frame {PAYLOAD_BYTES_MAX:,}",
-                )
-            return pack_frame(Frame(to, self.own, Kind.GREETING, number, payload))
+            return pack_frame(Frame(to, self.own, Kind.GREETING, number, _payload(said)))
         before = b"" if self.standing is Standing.GOING else canonical_json(self.standing.value) + b"\n"
         lines: list[bytes] = []
         while peer.queue and (not lines or len(peer.queue[0]) + sum(map(len, lines)) <= BATCH_BYTES_MAX):
@@ -421,6 +425,10 @@ def addresses_on_a_line(coordinators: tuple[str, ...], controllers: tuple[str, .
         )
         raise InputError([Diagnostic("F5021", message, "link the hosts over a network")])
     return {**dict.fromkeys(coordinators, MASTER), **{name: i for i, name in enumerate(controllers, 1)}}
+
+
+def _payload(said: _Said) -> bytes:
+    return canonical_json(_SAID.dump_python(said, mode="json"))
 
 
 def _line(sender: str, receiver: str, text: bytes) -> bytes:

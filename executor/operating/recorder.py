@@ -56,7 +56,7 @@ class LineStream(Protocol):
 _SHORT: Final = "it is shorter than its journal says; was it changed, or the power cut?"
 _TORN: Final = "its last lines are not text as they were written; was it changed, or the power cut?"
 _TAIL_BYTES: Final = 65_536
-"""So much of a file is looked at before it is gone on with: a power cut leaves its last blocks empty."""
+"""So much of a file is looked at before it is gone on with: a power cut leaves its last blocks empty, however many."""
 
 
 class TraceFile:

@@ -114,7 +114,7 @@ export class TopView {
       const title = svg("title");
       title.textContent = `${name}${name === view.arrivals ? ", where workpieces come" : view.departures.includes(name) ? ", where they leave" : ""}`;
       const isOnTable = Object.values(view.tables).some(([a, b]) => a === x && b === y); // whose own name is above
-      station.append(title, svg("rect", { x: x - WIDTH / 2, y: y - WIDTH / 2, width: WIDTH, height: WIDTH, rx: 5 }), this.label(x, y + (isOnTable ? 1 : -1) * (WIDTH / 2) + (isOnTable ? 16 : -10), name, "spot"));
+      station.append(title, svg("rect", { x: x - WIDTH / 2, y: y - WIDTH / 2, width: WIDTH, height: WIDTH, rx: 5 }), this.label(x, y + (isOnTable ? WIDTH / 2 + 16 : -WIDTH / 2 - 10), name, "spot"));
       if (name === view.arrivals) station.append(svg("path", { d: `M${x - 58} ${y}h22m-8 -7l8 7l-8 7`, class: "way" }));
       if (view.departures.includes(name)) station.append(svg("path", { d: `M${x + 36} ${y}h22m-8 -7l8 7l-8 7`, class: "way" }));
       this.drawing.append(station);

@@ -5,7 +5,6 @@ import os
 import pty
 import random
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -19,6 +18,7 @@ from support.link_rigs import CONTROLLERS, PATIENCE_SECONDS, Heard, SerialRig, o
 from firable.executor.links.framing import PAYLOAD_BYTES_MAX, Frame, FrameReader, Kind, pack_frame
 from firable.executor.links.link import COORDINATOR, Greeting
 from firable.executor.links.serial_line import SerialLink, addresses_on_a_line
+from firable.executor.links.storages import LIVES_MAX, Memory, Met, Storage
 from firable.executor.protocol.messages import Decision
 from firable.nets.diagnostics import InputError
 
@@ -215,25 +215,39 @@ def test_a_message_that_no_frame_holds_ends_the_link() -> None:
     asyncio.run(main())
 
 
-def test_a_greeting_that_no_frame_holds_ends_the_link_of_whoever_would_give_it() -> None:
-    others = tuple(f"a_station_among_{i:03}_others" for i in range(200))
+def test_a_host_that_cannot_say_who_it_is_in_a_frame_is_refused_before_the_line_is_opened() -> None:
+    names = tuple(f"station_{i:03}" for i in range(255))
+    addresses = addresses_on_a_line((COORDINATOR,), names)
+    with pytest.raises(InputError, match="to say who this host is takes") as caught:
+        SerialLink(Greeting("0" * 64, names), "/dev/null", addresses, 1)
+    assert caught.value.diagnostics[0].code == "F5021"
+    SerialLink(Greeting("0" * 64, names[:40]), "/dev/null", addresses, 1)
 
-    async def main(*, at_station: bool) -> None:
+
+def test_the_longest_greeting_is_one_frame() -> None:
+    """Of a host that was started as often as is remembered, and whose journal was stored ten thousand million times."""
+    stored = 10**10
+    storage = Storage("5eed5eed")
+    for life in range(LIVES_MAX):
+        storage = storage.in_new_life(f"{life:08}", stored)
+    master = Storage("1a1a1a1a").in_new_life("2b2b2b2b", stored)
+    known = {COORDINATOR: Met(master.name, master.life, stored)}
+    names = ("robot", *(f"station_{i:03}" for i in range(40)))
+
+    async def main() -> None:
         async with over_a_serial_line() as rig:
-            here, there = rig.link(Greeting("d", (COORDINATOR,))), rig.link(Greeting("d", ("robot",)))
-            failing, other = (there, here) if at_station else (here, there)
-            failing.greeting = Greeting("d", (*failing.greeting.names, *others))
-            standing = asyncio.create_task(other.run(Heard()))
-            with pytest.raises(InputError, match="a greeting with all machines here has"):
-                async with asyncio.timeout(PATIENCE_SECONDS):
-                    await failing.run(Heard())
-            assert not standing.done()
-            standing.cancel()
-            with suppress(asyncio.CancelledError):
-                await standing
+            here, there = rig.link(Greeting("d" * 64, (COORDINATOR,))), rig.link(Greeting("d" * 64, ("robot",)))
+            there.greeting = Greeting("d" * 64, names)
+            centre, station = Heard(memory=Memory(master)), Heard(memory=Memory(storage, known))
+            links = [asyncio.create_task(here.run(centre)), asyncio.create_task(there.run(station))]
+            async with asyncio.timeout(PATIENCE_SECONDS):
+                await centre.until_told(("connected", names[-1]))
+            assert not any(link.done() for link in links)
+            for link in links:
+                link.cancel()
+            await asyncio.gather(*links, return_exceptions=True)
 
-    for at_station in (False, True):
-        asyncio.run(main(at_station=at_station))
+    asyncio.run(main())
 
 
 def test_more_controllers_than_addresses_are_refused() -> None:
