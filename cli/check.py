@@ -15,7 +15,7 @@ from firable.cli import text
 from firable.cli.choice import OneOf
 from firable.cli.evidence_files import is_evidence
 from firable.cli.files import FOLDER, NETS, READ, WRITTEN_NET, net_files
-from firable.cli.loop import loop_report, machines_option, show_loop
+from firable.cli.loop import loop_report, machines_option, show_binding, show_loop
 from firable.cli.net_files import demand_a_net_file
 from firable.cli.options import (
     analysis_options,
@@ -239,6 +239,7 @@ def _report(argument: str, asked: _Asked, evidence_dir: str | None, *, bind: str
         course=kept.course,
         notes=loaded.notes,
         files=files,
+        binding=bind or "",
         again=again,
         positions=loaded.positions,
     )
@@ -329,6 +330,7 @@ def _show(report: Report, *, verbose: bool) -> None:
     whole = "" if figures["complete"] else " so far"
     edges = "edges not counted" if figures["edges"] is None else text.counted(figures["edges"], "edge")
     click.echo(f"  {text.counted(figures['markings'], 'marking')}, {edges}{whole}; {words}, external gates free")
+    show_binding(report)
     if verbose or len(report.course) > 1:
         for line in (*report.course, *(["taken from the cache: this net was checked before"] if report.again else [])):
             click.echo(f"  {line}")

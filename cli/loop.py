@@ -126,6 +126,7 @@ def loop_report(
         notes=(*loaded.notes, *late_limits(model, loaded.net)),
         course=report.closed.course,
         files=files,
+        binding=bind or "",
         loop_net=report.loop.net,
         positions=loaded.positions,
         loop={
@@ -155,6 +156,14 @@ def _compared(one: Difference) -> dict[str, str]:
     return data | ({"remark": one.remark} if one.remark else {})
 
 
+def show_binding(report: Report) -> None:
+    """Print which binding was found to fit the net, if one was asked about."""
+    if report.binding:
+        from firable.nets.source import printable
+
+        click.echo(f"  {printable(report.binding)} binds each signal and command")
+
+
 def show_loop(report: Report, *, verbose: bool) -> None:
     """Print the report on a net with its machines."""
     for note in report.notes:
@@ -162,6 +171,7 @@ def show_loop(report: Report, *, verbose: bool) -> None:
     loop = report.loop
     click.echo(f"{click.style(report.net.name, bold=True)}  {click.style(report.input, dim=True)}")
     click.echo(f"  with its machines: {loop['machines']}")
+    show_binding(report)
     counts = [(loop["places"], "place"), (loop["transitions"], "transition"), (loop["markings"], "marking")]
     edges = "edges not counted" if loop["edges"] is None else text.counted(loop["edges"], "edge")
     whole = "" if loop["complete"] else " so far"

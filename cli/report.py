@@ -44,9 +44,9 @@ class Report:
 
     `loop_net` is the net with its machines, of which some verdicts show runs (`net_of`), and `protocols` are others, by
     the names of the verdicts on them; `outages`, `faults` and `refutations` are told beside those. `claims` are, where
-    the verdicts say whether evidence shows something, what it claims of each. `page` is the report as a page for a
-    person, where one was written. `again` says that the same was decided before, which a program need not know;
-    `positions` say where the parts of the net stand in its file.
+    the verdicts say whether evidence shows something, what it claims of each. `binding` was found to fit the net.
+    `page` is the report as a page for a person, where one was written. `again` says that the same was decided before,
+    which a program need not know; `positions` say where the parts of the net stand in its file.
     """
 
     command: str
@@ -61,6 +61,7 @@ class Report:
     assumptions: Sequence[str] = ()
     standing: Sequence[Standing] = ()
     files: Sequence[str] = ()
+    binding: str = ""
     run: Mapping[str, Any] = field(default_factory=dict)
     bundle: Mapping[str, str] = field(default_factory=dict)
     loop: Mapping[str, Any] = field(default_factory=dict)
@@ -109,7 +110,18 @@ class Report:
         }
         if self.table:
             data["table"] = [_row_to_json(row) for row in self.table]
-        for key in ("discipline", "course", "figures", "assumptions", "files", "run", "loop", "split", "bundle"):
+        for key in (
+            "discipline",
+            "course",
+            "figures",
+            "assumptions",
+            "files",
+            "binding",
+            "run",
+            "loop",
+            "split",
+            "bundle",
+        ):
             if value := getattr(self, key):
                 data[key] = list(value) if isinstance(value, tuple) else value
         if self.page:

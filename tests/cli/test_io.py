@@ -29,6 +29,7 @@ from firable.semantics.replaying import replay
 from firable.semantics.trace import read_trace
 
 SCHEMA = json.loads(files("firable.cli").joinpath("io.schema.json").read_text(encoding="utf-8"))
+REPORT_SCHEMA = json.loads(files("firable.cli").joinpath("report.schema.json").read_text(encoding="utf-8"))
 NET = catalogue_net("one_robot")
 SENSORS = read_plant(catalogue_path("one_robot").with_name("one_robot.plant.yaml")).sensors
 
@@ -181,13 +182,25 @@ def test_a_binding_is_held_against_its_net_without_a_device(
     bind.write_text(text.replace("host: 127.0.0.1", "host: 127.0.0.1\n    start_s: 0.2"))
     fits = main([*command, str(bind)])
     assert fits == (3 if "io" in command else 0), "nobody is there, and that it fits is no matter of that"
-    assert "F5101" not in capsys.readouterr().err
+    said = capsys.readouterr()
+    assert "F5101" not in said.err
+    assert (f"{bind} binds each signal and command" in said.out) == ("check" in command)
     lines = bind.read_text().splitlines(keepends=True)
     bind.write_text("".join(line for line in lines if not line.startswith("  mc.part_present:")))
     assert main([*command, str(bind)]) == 2
     said = capsys.readouterr()
     assert "error[F5101]: the signal 'mc.part_present' is not bound" in said.err
     assert "must hold" not in said.out
+
+
+def test_the_report_of_a_check_names_the_binding_that_fits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bind = tmp_path / "c.bind.yaml"
+    bind.write_text(binding_text(NET, {"modbus": str(free_port())}, SENSORS))
+    for machines in ([], ["--machines", "catalogue:one_robot"]):
+        assert main(["check", "catalogue:one_robot", "--bind", str(bind), *machines, "--format", "json"]) == 0
+        report = json.loads(capsys.readouterr().out)
+        jsonschema.Draft202012Validator(REPORT_SCHEMA).validate(report)
+        assert report["reports"][0]["binding"] == str(bind)
 
 
 def test_a_binding_is_of_one_net(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -216,7 +229,7 @@ def test_bundle_runs_on_the_machines_of_a_binding_until_it_is_stopped(cell: Cell
     said, _ = running.communicate(timeout=PATIENCE_SECONDS)
     assert running.returncode == 0, said
     report = json.loads(said[said.index("{") :])
-    schema = json.loads(files("firable.cli").joinpath("report.schema.json").read_text(encoding="utf-8"))
+    schema = REPORT_SCHEMA
     bound = {
         **schema,
         "properties": {"run": {"$ref": "#/$defs/bound_run"}},
