@@ -25,7 +25,7 @@ from __future__ import annotations
 import json
 import os
 import sqlite3
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -33,6 +33,7 @@ from typing import Any, Final, NoReturn
 from zlib import crc32
 
 from firable.executor.journal.journal import Storing
+from firable.executor.links.link import all_called
 from firable.executor.protocol.messages import Effect, Keep, Stored
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.source import printable
@@ -220,8 +221,8 @@ class SqliteJournal:
         else:
             # The header as it is, where it does not say whose the journal is.
             with suppress(ValueError, TypeError):
-                machines = _called(json.loads(machines))
-            message = f"{path}: the journal is of {printable(machines)}, and not of {_called(self.machines)}"
+                machines = all_called(map(str, json.loads(machines)))
+            message = f"{path}: the journal is of {printable(machines)}, and not of {all_called(self.machines)}"
         hint = "name another journal, or run the bundle that the journal belongs to"
         raise InputError([Diagnostic("F5031", message, hint)])
 
@@ -245,10 +246,6 @@ def machines_of(path: Path | str) -> tuple[str, ...]:
         if not isinstance(names, list):
             _damaged(path, "its header is missing")
     return tuple(map(str, names))
-
-
-def _called(machines: Sequence[str]) -> str:
-    return ", ".join(name or "the coordinator" for name in machines)
 
 
 _NOTHING: Final = "nothing stands in it"

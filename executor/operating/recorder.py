@@ -74,18 +74,17 @@ class TraceFile:
             mode = "r+" if size_bytes or Path(path).is_file() else "w"
             # No buffer, whose lock a write that hangs would hold.
             self.file = FileIO(path, mode, opener=open_at_once)
-            if size_bytes and self.file.seek(0, os.SEEK_END) < size_bytes:
+            if size_bytes and (lost := self._lost(size_bytes)):
                 self.file.close()
-                raise ValueError(_SHORT)
-            if size_bytes and self._is_torn(size_bytes):
-                self.file.close()
-                raise ValueError(_TORN)
+                raise ValueError(lost)
 
-    def _is_torn(self, size_bytes: int) -> bool:
-        """Whether no line ends where the file is gone on with, or blocks before that were never written."""
+    def _lost(self, size_bytes: int) -> str:
+        """What is not there any more of the lines before these bytes, in words."""
+        if self.file.seek(0, os.SEEK_END) < size_bytes:
+            return _SHORT
         begin = self.file.seek(max(size_bytes - _TAIL_BYTES, 0))
         tail = self.file.read(size_bytes - begin)
-        return not tail.endswith(b"\n") or b"\0" in tail
+        return "" if tail.endswith(b"\n") and b"\0" not in tail else _TORN
 
     def _cut(self, size_bytes: int) -> None:
         if stat.S_ISREG(os.fstat(self.file.fileno()).st_mode):  # of a pipe or a device nothing can be cut

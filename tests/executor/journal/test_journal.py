@@ -144,7 +144,7 @@ def test_journal_of_other_machines_is_refused(tmp_path: Path) -> None:
     filled(tmp_path).close()
     code, message = refused(lambda: sqlite(tmp_path, machines=("a", "c")))
     assert code == "F5031"
-    assert message == f"{tmp_path}/cell.journal: the journal is of a, b, and not of a, c"
+    assert message == f"{tmp_path}/cell.journal: the journal is of 'a', 'b', and not of 'a', 'c'"
 
 
 def test_journal_that_was_copied_without_what_belongs_to_it_is_refused_and_not_begun_anew(tmp_path: Path) -> None:
