@@ -356,8 +356,11 @@ def test_plant_file_beside_the_net_is_the_one_that_is_served(
     command = ["sim", "turning.firable.yaml", "--modbus", "--for", "0"]
     assert main(command) == 2
     assert "there is no turning.plant.yaml, and none in the catalogue is 'turning'" in capsys.readouterr().err
-    plant = catalogue_path("one_robot").with_name("one_robot.plant.yaml")
-    Path("turning.plant.yaml").write_text(plant.read_text("utf-8"), "utf-8")
+    plant = catalogue_path("one_robot").with_name("one_robot.plant.yaml").read_text("utf-8")
+    Path("turning.plant.yaml").write_text(plant, "utf-8")
+    assert main(command) == 2
+    assert "this plant file is for the cell 'one-robot'" in capsys.readouterr().err
+    Path("turning.plant.yaml").write_text(plant.replace("plant: one-robot", "plant: turning", 1), "utf-8")
     assert main(command) == 0
 
 
