@@ -10,8 +10,8 @@ What needs the whole graph raises `IncompleteGraph` where `complete` is false, s
 part. The rest (markings, contacts, deadlocks, paths) holds of the part explored.
 
 What may take long releases the interpreter and takes `max_seconds`, the time left, and `cancelled`, which is asked some
-twenty times a second and says whether the answer is no longer needed. What they raise, and what a signal handler
-raises, comes out. An exploration that is ended so is incomplete; any other work raises `BudgetExceeded`.
+twenty times a second, at first more often, and says whether the answer is no longer needed. What they raise, and what a
+signal handler raises, comes out. An exploration that is ended so is incomplete; any other work raises `BudgetExceeded`.
 """
 
 from collections.abc import Callable, Mapping
@@ -61,7 +61,8 @@ def explore(
 
     Running out of a budget, and Ctrl-C, give an incomplete graph with its `reason`. `max_memory_bytes` counts all
     that the engine holds, copies while a table grows included; time is looked at every few thousand edges. `progress`
-    is told the number of markings and edges found so far, some twenty times a second, in the calling thread.
+    is told the number of markings and edges found so far, some twenty times a second, at first more often, in the
+    calling thread.
 
     Under interleaving 2 `threads` share the larger levels; where `second_free` is given, those that begin while it last
     said so. The numbering is then another than that of one thread, and as much a function of the arguments.

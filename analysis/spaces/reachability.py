@@ -338,9 +338,10 @@ def explore(
     """The reachability graph of a net, external gates free, or as much of it as the budget allows.
 
     The `deadline` ends the exploration and, later, the questions to the graph; the seconds of the budget end the
-    exploration alone. `progress` is told the markings and edges found so far, some twenty times a second. Two `threads`
-    share the large levels of interleaving, those that begin while `second_free` says that a processor is free for the
-    second; they number the markings of a level in another order than one does, the same every time.
+    exploration alone. `progress` is told the markings and edges found so far, some twenty times a second, at first
+    more often. Two `threads` share the large levels of interleaving, those that begin while `second_free` says that a
+    processor is free for the second; they number the markings of a level in another order than one does, the same every
+    time.
 
     Raises `InputError` F3004 where the budget of memory does not even hold the net.
 

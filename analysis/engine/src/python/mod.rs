@@ -1,9 +1,10 @@
 //! What every file of the binding shares: exceptions, long work, and the forms in which Python gives nets and markings.
 //!
-//! A file of the binding only converts. Long work releases the interpreter and comes back to it some twenty times a second
-//! (`Watch`): for signals, so that Ctrl-C ends it; for the caller's `cancelled`, so that a method that lost a race
-//! ends; and to tell `progress` how far it is. An exploration that is stopped hands out what it knows; any other work
-//! raises, `KeyboardInterrupt` or what a handler raised where a signal came, else `BudgetExceeded`.
+//! A file of the binding only converts. Long work releases the interpreter and comes back to it some twenty times a
+//! second, at first more often (`Watch`): for signals, so that Ctrl-C ends it; for the caller's `cancelled`, so that a
+//! method that lost a race ends; and to tell `progress` how far it is. An exploration that is stopped hands
+//! out what it knows; any other work raises, `KeyboardInterrupt` or what a handler raised where a signal came, else
+//! `BudgetExceeded`.
 
 pub(crate) mod compact;
 pub(crate) mod components;
