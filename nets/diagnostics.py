@@ -12,13 +12,17 @@ in docs/codes with an example that is run (or a row in tests/support/exact_words
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
 from typing import Final
 
 Subject = tuple[str, ...]
 """What a problem is about: a path of names from the root of the net, e.g. `("places", "robot.free")`."""
+
+
+DIAGNOSTICS_MAX: Final = 80
+"""So many problems of one input are shown."""
 
 
 class Severity(StrEnum):
@@ -215,6 +219,16 @@ class Diagnostic:
         if self.hint:
             lines.append(f"  hint: {self.hint}")
         return "\n".join(lines)
+
+
+def bounded(problems: list[Diagnostic]) -> list[Diagnostic]:
+    """The first of the diagnostics; the last one of them tells how many are left out."""
+    if len(problems) <= DIAGNOSTICS_MAX:
+        return problems
+    shown, left = problems[:DIAGNOSTICS_MAX], len(problems) - DIAGNOSTICS_MAX
+    last = shown[-1]
+    hint = f"{last.hint} ({left:,} more problems are not shown)".strip()
+    return [*shown[:-1], replace(last, hint=hint)]
 
 
 class InputError(Exception):

@@ -17,9 +17,8 @@ from typing import Any, Final
 from pydantic import BaseModel, ValidationError
 
 from firable.nets import document as doc
-from firable.nets.diagnostics import Diagnostic, Subject, did_you_mean
+from firable.nets.diagnostics import Diagnostic, Subject, bounded, did_you_mean
 from firable.nets.source import Source, quoted
-from firable.nets.text_positions import bounded
 from firable.nets.yaml_tree import Mapping as MappingNode
 from firable.nets.yaml_tree import Node, Path, Scalar, Sequence, as_written, node_span, nodes_along
 

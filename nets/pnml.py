@@ -22,13 +22,12 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
-from firable.nets.diagnostics import Diagnostic, InputError, Severity, did_you_mean
+from firable.nets.diagnostics import Diagnostic, InputError, Severity, bounded, did_you_mean
 from firable.nets.net import Net, Place, Transition
 from firable.nets.pausing import without_cycle_search
 from firable.nets.pnml_writer import write_pnml
 from firable.nets.pnml_xml import PnmlRecords, Record, described, parse_xml
 from firable.nets.source import Source, printable, quoted, read_bytes
-from firable.nets.text_positions import bounded
 from firable.nets.well_formed import FORBIDDEN_IN_NAMES, is_name
 
 __all__ = ["PnmlImport", "parse_pnml", "read_pnml", "write_pnml"]

@@ -19,7 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.diagnostics import Diagnostic, InputError, bounded
 from firable.nets.formula import Compare, Constant, Count, Deadlock, Firable, Formula, FormulaError, Or, Sign
 from firable.nets.net import Net
 from firable.nets.queries import PROBLEMS_MAX, KnownNames, Query, QueryKind
@@ -39,7 +39,6 @@ from firable.nets.temporal import (
     negated,
     operands_of,
 )
-from firable.nets.text_positions import bounded
 from firable.nets.well_formed import is_name
 from firable.nets.xml_tree import Element, parse_elements
 

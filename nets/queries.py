@@ -21,7 +21,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Final
 
-from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.diagnostics import Diagnostic, InputError, bounded
 from firable.nets.formula import (
     CONSTANT_ATOMS,
     Compare,
@@ -37,7 +37,6 @@ from firable.nets.net import Net
 from firable.nets.source import Source, quoted, read_bytes, source_of
 from firable.nets.temporal import Logic, Temporal, format_temporal, logics, parse_temporal
 from firable.nets.temporal_parts import atoms_in
-from firable.nets.text_positions import bounded
 from firable.nets.well_formed import is_name, unknown_in_formula
 
 SIZE_BYTES_MAX: Final = 64 * 1024 * 1024

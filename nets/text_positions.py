@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
-from firable.nets.diagnostics import Diagnostic, Span, Subject
+from firable.nets.diagnostics import Diagnostic, Span, Subject, bounded
 from firable.nets.source import Source
 from firable.nets.time_limits import fault_transition_name, timer_name
 from firable.nets.yaml_tree import (
@@ -30,8 +30,6 @@ from firable.nets.yaml_tree import (
     scalars_of,
     value_of,
 )
-
-DIAGNOSTICS_MAX: Final = 80
 
 _SECOND: Final = frozenset({"F2001", "F2006", "F2007", "F2022"})
 """What is about the second of two equal names."""
@@ -178,16 +176,6 @@ class Positions:
                     yield ("signals", prefix + until.text), until
                 declared.add(until.text)
             yield from _limit(prefix + local, prefix, value_of(place, "within"))
-
-
-def bounded(problems: list[Diagnostic]) -> list[Diagnostic]:
-    """The first of the diagnostics; the last one of them tells how many are left out."""
-    if len(problems) <= DIAGNOSTICS_MAX:
-        return problems
-    shown, left = problems[:DIAGNOSTICS_MAX], len(problems) - DIAGNOSTICS_MAX
-    last = shown[-1]
-    hint = f"{last.hint} ({left:,} more problems are not shown)".strip()
-    return [*shown[:-1], replace(last, hint=hint)]
 
 
 def _joined(problems: list[Diagnostic]) -> list[Diagnostic]:

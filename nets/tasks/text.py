@@ -15,13 +15,12 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from firable.nets.diagnostics import Diagnostic, InputError, Span, did_you_mean
+from firable.nets.diagnostics import Diagnostic, InputError, Span, bounded, did_you_mean
 from firable.nets.document_errors import document_problems, version_problem
 from firable.nets.net import Command, TaskUse
 from firable.nets.source import Source, read_source
 from firable.nets.tasks import document as doc
 from firable.nets.tasks.model import Catalogue, Gate, Move, Role, Step, Subtask, Task
-from firable.nets.text_positions import bounded
 from firable.nets.time_limits import no_time, parse_time
 from firable.nets.well_formed import is_name
 from firable.nets.yaml_tree import Node, Scalar, Sequence, data, node_span, nodes_along, parse_tree
