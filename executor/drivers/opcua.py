@@ -8,7 +8,10 @@ which is the number of a command, goes out when the others are confirmed, becaus
 request in any order.
 
 A client that has lost its connection is not repaired: asyncua can reconnect by itself, and would then bring back
-subscriptions with what was queued in the meantime. A new client begins with what the nodes hold now.
+subscriptions with what was queued in the meantime. A new client begins with what the nodes hold now. So it is where the
+server answers, and has dropped the subscription or tells of it no more: what was read once would look good for ever.
+While nothing changes it is to say that it is there several times within the time of an answer; asyncua would have it
+do so every three quarters of an hour, and subscribe anew by itself.
 """
 
 from __future__ import annotations
@@ -19,7 +22,9 @@ from base64 import b64decode, b64encode
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from importlib import import_module
+from math import inf
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Any, Final, Literal
 from urllib.parse import urlsplit
 from uuid import UUID
@@ -49,9 +54,13 @@ from firable.executor.reasons import reason
 if TYPE_CHECKING:
     from asyncua.client.client import Client
     from asyncua.common.node import Node
+    from asyncua.common.subscription import Subscription
 
 QUEUE: Final = 1000
 """How many changes of a node the server keeps between two of its messages."""
+
+SIGNS: Final = 4
+"""How often within the time of an answer the server is to say that the subscription is there, while nothing changes."""
 
 OVERFLOW: Final = 0x480
 """The bits of a status by which a server says that it has dropped changes from a queue."""
@@ -98,19 +107,39 @@ class OpcUaConnection(Stepwise):
         self.points: dict[str, Point] = {}
         self.types: dict[Point, Any] = {}
         self.is_first = True
+        self.looking: asyncio.TimerHandle | None = None
+        """When it is looked next whether the server still tells of the subscription."""
 
     async def open(self, every_s: float) -> None:
         """Connect, and subscribe to what is wanted."""
-        from asyncua.ua.uatypes import Double
+        from asyncua.ua.uaprotocol_auto import CreateSubscriptionParameters, CreateSubscriptionResult
+        from asyncua.ua.uatypes import Byte, Double, UInt32
 
         self.client.connection_lost_callback = self._lost
         await self.client.connect()
         drop_at_close(self._transport)
         nodes = [self.client.get_node(point) for point in self.wanted.read]
         self.points = {node.nodeid.to_string(): point for node, point in zip(nodes, self.wanted.read, strict=True)}
-        subscription = await self.client.create_subscription(1000 * every_s, self)
+        signs = max(1, int(self.wanted.timeout_s / SIGNS / every_s))
+        asked = CreateSubscriptionParameters(
+            RequestedPublishingInterval=Double(1000 * every_s),
+            RequestedLifetimeCount=UInt32(max(10_000, 3 * signs)),
+            RequestedMaxKeepAliveCount=UInt32(signs),
+            MaxNotificationsPerPublish=UInt32(10_000),
+            PublishingEnabled=True,
+            Priority=Byte(0),
+        )
+        given: list[CreateSubscriptionResult] = []
+        # As the server has it: asyncua would ask for its own long silence again where the server has another interval.
+        setattr(self.client, "get_subscription_revised_params", lambda _, result: given.append(result))  # noqa: B010
+        self.client._stale_check_margin = inf
+        subscription = await self.client.create_subscription(asked, self)
+        if (publishing := self.client.uaclient.session._publish_task) is not None:
+            publishing.add_done_callback(self._ended)
         if nodes:
             several: Iterable[Node] = nodes
+            silence_s = given[0].RevisedPublishingInterval / 1000 * max(1, given[0].RevisedMaxKeepAliveCount)
+            self._look(subscription, silence_s + self.wanted.timeout_s, monotonic())
             made = await subscription.subscribe_data_change(several, queuesize=QUEUE, sampling_interval=Double(0))
             for point, one in zip(self.wanted.read, made, strict=True):
                 if not isinstance(one, int):
@@ -140,6 +169,8 @@ class OpcUaConnection(Stepwise):
 
     async def close(self) -> None:
         """End the session if that can be, and the connection in any case."""
+        if self.looking is not None:
+            self.looking.cancel()
         transport = self._transport
         try:
             if not self.is_in_doubt:
@@ -167,6 +198,20 @@ class OpcUaConnection(Stepwise):
 
     async def _lost(self, error: Exception) -> None:
         self.told.put_nowait(error)
+
+    def _ended(self, publishing: asyncio.Task[None]) -> None:
+        """Nobody asks any more for what the subscription tells: the server has said that there is none."""
+        if not publishing.cancelled():
+            self.told.put_nowait(LinkError("the server has dropped the subscription"))
+
+    def _look(self, subscription: Subscription, within_s: float, since_seconds: float) -> None:
+        """Look whether the server has told of a subscription in time, a change or that there is none."""
+        since_seconds = subscription.last_publish_at or since_seconds
+        if (left_s := since_seconds + within_s - monotonic()) > 0:
+            loop = asyncio.get_running_loop()
+            self.looking = loop.call_later(left_s, self._look, subscription, within_s, since_seconds)
+        else:
+            self.told.put_nowait(LinkError(f"the server has told nothing of the subscription for {within_s:g} s"))
 
     @property
     def _transport(self) -> asyncio.Transport | None:

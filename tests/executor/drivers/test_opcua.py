@@ -2,12 +2,12 @@
 
 import asyncio
 from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from typing import Any
 
 import pytest
 
-from firable.executor.drivers.bench import Far
+from firable.executor.drivers.bench import PATIENCE_S, Far
 from firable.executor.drivers.conformance import DriverConformance
 from firable.executor.drivers.device import LinkError, Use, Wanted
 from firable.executor.drivers.far_side.machine import ROLES
@@ -52,6 +52,36 @@ class TestOpcUa(DriverConformance):
                 await connection.write((("ns=2;s=M.numbr", 1),))
             await connection.close()
             await self.end.stop()
+
+        self.run(main())
+
+    @pytest.mark.parametrize("is_dropped", [True, False])
+    def test_a_subscription_that_the_server_has_dropped_or_tells_nothing_of_ends_the_connection(
+        self, is_dropped: bool, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """The server answers all questions meanwhile, so that what was read once would look good for ever."""
+
+        async def main() -> None:
+            await self.end.start(lambda _point, _value: None)
+            options = OpcUaOptions(url=f"opc.tcp://127.0.0.1:{self.end.port}/")
+            connection = await KIND.connect(options, Wanted((POINTS["sensor"],), 1.0))
+            assert [point for point, _ in await connection.read()] == [POINTS["sensor"]]
+            with suppress(TimeoutError):  # nothing changes, and the server says that the subscription is there
+                pytest.fail(str(await asyncio.wait_for(connection.read(), 3.0)))
+            served = self.end.server.iserver.subscription_service
+            if is_dropped:
+                await served.delete_subscriptions(list(served.subscriptions))
+            else:
+                for one in served.subscriptions.values():
+                    monkeypatch.setattr(one, "publish_results", nothing)
+            why = "has (dropped|told nothing of) the subscription"  # it may keep the question for what it has dropped
+            with pytest.raises(LinkError, match=why):
+                await asyncio.wait_for(connection.read(), PATIENCE_S)
+            await connection.close()
+            await self.end.stop()
+
+        async def nothing(*_args: Any) -> bool:
+            return False
 
         self.run(main())
 
