@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final
 
 from firable.executor.drivers.binding import CommandDocument, SignalDocument, writes
 from firable.executor.drivers.channels import Channel, Order, Outcome, Said
-from firable.executor.drivers.device import Point, Value, Wanted, Writes, as_bit
+from firable.executor.drivers.device import Point, Value, Wanted, Writes, as_bit, quoted
 from firable.executor.drivers.driver import Quality, Reading
 from firable.executor.drivers.emergency import Contacts
 from firable.executor.drivers.handshake import Handshake
@@ -98,7 +98,8 @@ class BoundDevice:
         self.late: dict[Channel | Handshake, Order] = {}
         """What it has not shown to have taken by then, of each channel the newest."""
         self.noted = ""
-        self.garbage: dict[Point, Value] = {}
+        self.garbage: dict[Point, str] = {}
+        """What was told of the points of channels that said nothing of a command."""
         points = {*self.image.reads, *self.image.counters, *self.replies}
         points |= {point for point in (self.tripped, None if alive is None else alive.read) if point is not None}
         wanted = Wanted(
@@ -415,11 +416,12 @@ class BoundDevice:
             self._fault(f"{_several(faults)} cannot be read: {self.image.readings[faults[0]].why}")
 
     def _replied(self, channel: Channel | Handshake, key: str, point: Point, value: Value) -> None:
+        is_new = channel.shown.get(key, 0) is not None  # else a text that changes would be told as often as it does
         for outcome in channel.shows(key, value):
             self._said(outcome)
-        if channel.shown[key] is None and value != self.garbage.get(point):
-            self.garbage[point] = value
-            self.note(f"'{point}' shows {value!r}, which says nothing of a command")
+        if channel.shown[key] is None and is_new and quoted(value) != self.garbage.get(point):
+            self.garbage[point] = quoted(value)
+            self.note(f"'{point}' shows {quoted(value)}, which says nothing of a command")
 
     def _said(self, outcome: Outcome) -> None:
         order = outcome.order

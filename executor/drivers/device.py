@@ -32,6 +32,9 @@ Point = str
 Value = bool | int | float | str
 """What a point holds. A text that means a number or a truth value counts as that (`as_bit`, `as_number`)."""
 
+TOLD_MAX: Final = 40
+"""So much of a text is told that is no value: anybody may publish a picture where a number should be."""
+
 DIGITS_MAX: Final = 20
 """A text of more digits is no number of a device: 64 bits have no more."""
 
@@ -285,6 +288,17 @@ def quiet(library: str) -> None:
     logger = logging.getLogger(library)
     if not logger.handlers:
         logger.addHandler(logging.NullHandler())
+
+
+def quoted(value: Value) -> str:
+    """A value as it is told of: of a long text its beginning, and how long it is.
+
+    >>> quoted(7), quoted("open"), quoted("x" * 5000)
+    ('7', "'open'", "'xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx'... (5000 characters)")
+    """
+    if isinstance(value, str) and len(value) > TOLD_MAX:
+        return f"{value[:TOLD_MAX]!r}... ({len(value)} characters)"
+    return repr(value)
 
 
 def as_bit(value: Value) -> bool | None:

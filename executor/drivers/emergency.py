@@ -22,7 +22,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from firable.executor.drivers.binding import EmergencyDocument, SignalDocument, shown_as
-from firable.executor.drivers.device import Point, Value, as_bit
+from firable.executor.drivers.device import Point, Value, as_bit, quoted
 from firable.executor.drivers.driver import Quality, Reading
 
 
@@ -58,7 +58,8 @@ class Contacts:
             for name, one in self.contacts.items():
                 if one.read == point and (bit := as_bit(value)) in {None, one.invert}:
                     self.open_ones.add(name)
-                    return f"'{name}' " + (f"shows {value!r}, which is neither 0 nor 1" if bit is None else "is open")
+                    is_no_bit = f"shows {quoted(value)}, which is neither 0 nor 1"
+                    return f"'{name}' " + (is_no_bit if bit is None else "is open")
         return ""
 
     def read(self, readings: Mapping[str, Reading]) -> None:

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
 from firable.executor.drivers.binding import SignalDocument
-from firable.executor.drivers.device import Point, Value, as_bit, as_number
+from firable.executor.drivers.device import Point, Value, as_bit, as_number, quoted
 from firable.executor.drivers.driver import Quality, Reading
 from firable.executor.protocol.record import record
 
@@ -37,6 +37,8 @@ class Image:
     def __init__(self, signals: Mapping[str, SignalDocument]) -> None:
         self.signals = signals
         self.readings = {name: Reading() for name in signals}
+        self.unreadable: set[str] = set()
+        """The signals that show neither 0 nor 1: a fault is told once, and not again of each other thing they show."""
         self.reads: dict[Point, list[str]] = {}
         self.counters: dict[Point, list[str]] = {}
         self.counted: dict[str, int] = {}
@@ -57,11 +59,15 @@ class Image:
                 reading, bit = self.readings[name], as_bit(value)
                 if bit is not None and bit ^ self.signals[name].invert is reading.value and name not in before:
                     self.readings[name] = Reading(reading.value, now_seconds, Quality.GOOD, "", reading.coalesced)
+                    self.unreadable.discard(name)
                     continue  # as most do that are polled
                 before.setdefault(name, reading.value)
                 if bit is None:
-                    faults += self._lose(name, f"'{point}' shows {value!r}, which is neither 0 nor 1")
+                    fault = self._lose(name, f"'{point}' shows {quoted(value)}, which is neither 0 nor 1")
+                    faults += fault if name not in self.unreadable else []
+                    self.unreadable.add(name)
                     continue
+                self.unreadable.discard(name)
                 bit ^= self.signals[name].invert
                 if reading.value is not None and bit != reading.value:
                     edges[name] = edges.get(name, 0) + 1
@@ -88,6 +94,7 @@ class Image:
         before = {name: reading.value for name, reading in self.readings.items()}
         faults = [fault for name in self.signals for fault in self._lose(name, why)]
         self.counted.clear()  # the device may count anew
+        self.unreadable.clear()
         return list(self._changes(before)), faults
 
     def _changes(self, before: Mapping[str, bool | None]) -> Iterator[Change]:

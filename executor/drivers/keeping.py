@@ -6,7 +6,8 @@ the last thing. A command may leave before that task has its turn (`urge`), wher
 the connection can begin a write (`device.Prompt`): the order is the same, and the command a turn of the event loop
 earlier. A connection that has failed in any way is closed and never asked again; the next one is made after a pause
 that doubles up to a bound, and is read before it is written, because what the device shows then decides what is still
-to be sent.
+to be sent. The pause is short again when a connection has stood for as long as an answer or a sign of life may take: a
+device that can be read and refuses what is written to it would else be connected, and told of, ten times a second.
 
 A stop breaks off a command that is being written, if it is not confirmed at once, and makes new connections until the
 device has confirmed the safe outputs, or has had its time. On these, and on each connection after an emergency stop,
@@ -169,6 +170,8 @@ class Kept:
         """What was begun on it meanwhile, and who writes is to wait for."""
         self.connections = 0
         """How many connections there have been."""
+        self.stood_seconds = 0.0
+        """How long the last of them has stood."""
         self.is_connected = False
         self.started = False
         """Whether the safe outputs of the start-up have been written, to a device that is alive."""
@@ -238,13 +241,15 @@ class Kept:
 
     async def _keep(self) -> None:
         pause_s = self.document.retry_s
+        alive = self.document.alive
+        enough_s = self.document.timeout_s if alive is None else min(alive.within_s, self.document.timeout_s)
         while not self.stopping:
-            before = self.connections
+            self.stood_seconds = 0.0
             try:
                 await self._connected()
             except _FAILURES as error:
                 self.served.lost(str(error) or "no answer in time")
-            if self.connections > before:
+            if self.stood_seconds >= enough_s:
                 pause_s = self.document.retry_s
             with suppress(TimeoutError):
                 await asyncio.wait_for(self._asked_to_stop(), pause_s)
@@ -283,6 +288,7 @@ class Kept:
         # In this task: one of its own would be left behind by who is cancelled twice, with an error nobody hears of.
         async with asyncio.timeout(2 * self.document.timeout_s):
             connection = await self.kind.connect(self.options, self.wanted)
+        before, since_seconds = self.connections, asyncio.get_running_loop().time()
         try:
             self.is_connected = True
             await self._first_of(self._serve(connection), self._watch())
@@ -291,6 +297,8 @@ class Kept:
             raise
         finally:
             self.is_connected = False
+            if self.connections > before:
+                self.stood_seconds = asyncio.get_running_loop().time() - since_seconds
             self._forget()
             await connection.close()
 

@@ -1,0 +1,110 @@
+"""Devices that misbehave for long: they are not connected to, and not told of, as often as they do."""
+
+import asyncio
+from collections.abc import Sequence
+from itertools import pairwise
+
+import pytest
+
+from firable.executor.drivers.bench import bench_net, until
+from firable.executor.drivers.binding import SignalDocument, parse_binding
+from firable.executor.drivers.bound import bound_driver
+from firable.executor.drivers.device import LinkError, Point, Value, Wanted, Writes
+from firable.executor.drivers.image import Image
+from firable.executor.drivers.keeping import Kept, Nobody
+from firable.executor.drivers.modbus import TCP, TcpOptions
+
+FLAPPING = """{firable_bind: 1, cell: c, devices: {D: {driver: modbus-tcp, host: h, timeout_s: TIMEOUT, retry_s: 0.02,
+retry_max_s: 0.5, heartbeat: {write: holding 0, every_s: 0.01}}}}"""
+
+
+class Refusing:
+    """A device that can be read, and refuses what is written to it."""
+
+    options = TcpOptions
+    through_broker = False
+
+    def __init__(self) -> None:
+        self.connections_at: list[float] = []
+        self.stands_s = 0.0
+        """For how long it takes a write before it refuses it."""
+
+    async def connect(self, options: object, wanted: Wanted) -> "Refusing":
+        """Be connected."""
+        del options, wanted
+        self.connections_at.append(asyncio.get_running_loop().time())
+        self.is_first = True
+        return self
+
+    async def read(self) -> Sequence[tuple[Point, Value]]:
+        """Show something, once."""
+        if not self.is_first:
+            await asyncio.get_running_loop().create_future()
+        self.is_first = False
+        return (("discrete 0", True),)
+
+    async def write(self, writes: Writes) -> None:
+        """Refuse it."""
+        del writes
+        await asyncio.sleep(self.stands_s)
+        raise LinkError("the device refuses holding 0: exception 2")
+
+    async def close(self) -> None:
+        """Nothing to be done."""
+
+    point_problem = TCP.point_problem
+    load = TCP.load
+
+
+@pytest.mark.parametrize("is_stable", [False, True])
+def test_the_pause_before_a_new_connection_grows_until_one_has_stood_for_a_while(is_stable: bool) -> None:
+    async def main() -> list[float]:
+        device = Refusing()
+        device.stands_s = 0.06
+        document = parse_binding(FLAPPING.replace("TIMEOUT", "0.05" if is_stable else "10")).document.devices["D"]
+        wanted = Wanted(("discrete 0",), document.timeout_s)
+        kept = Kept(document, device, TcpOptions(host="h"), wanted, Nobody())
+        task = asyncio.create_task(kept.run())
+        await until(lambda: len(device.connections_at) == 6, "six connections")
+        kept.stop()
+        await task
+        at = device.connections_at
+        return [later - before - device.stands_s for before, later in pairwise(at)]
+
+    pauses = asyncio.run(main())
+    grown = [0.02, 0.04, 0.08, 0.16, 0.32]
+    if is_stable:
+        assert sum(pauses) < sum(grown)
+    else:
+        assert all(pause > 0.9 * least for pause, least in zip(pauses, grown, strict=True))
+
+
+def test_a_signal_that_shows_one_thing_after_the_other_that_is_no_value_is_a_fault_once() -> None:
+    image = Image({"s": SignalDocument(device="D", read="topic")})
+    assert image.take([("topic", True)], 1.0)[1] == []
+    assert [image.take([("topic", f"{at}.5")], 2.0)[1] for at in range(3)] == [["s"], [], []]
+    assert image.take([("topic", True)], 3.0)[1] == []
+    assert image.take([("topic", "3.5")], 4.0)[1] == ["s"]
+    image.lost("no answer in time")
+    assert image.take([("topic", "4.5")], 5.0)[1] == ["s"]
+
+
+GARBAGE = """{firable_bind: 1, cell: conformance, devices: {D: {driver: mqtt, host: h,
+channels: {M: {number: number, taken: taken, done: done}}}}, signals: {M.held: {device: D, read: held},
+M.zero: {device: D, read: zero}, M.one: {device: D, read: one}, M.needed: {device: D, read: needed},
+M.moved: acknowledged, M.closed: acknowledged}, commands: {M.move: {device: D, channel: M, write: {code: 1}},
+M.grip: {device: D, channel: M, write: {code: 2}}, M.halt: {device: D, channel: M, write: {code: 3}}}}"""
+
+
+def test_what_says_nothing_of_a_command_is_told_once_as_long_as_it_does_and_not_at_length(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    device = bound_driver(parse_binding(GARBAGE), bench_net()).devices["D"]
+    notes: list[str] = []
+    monkeypatch.setattr(device, "note", notes.append)
+    for value in ("1.5", "2.5", "3.5", 7, "3.5", 7, "3.5", "4.5", 8, "x" * 1_000_000):
+        device.read((("done", value),))
+    shown = ["'1.5'", "'3.5'", f"'{'x' * 40}'... (1000000 characters)"]
+    assert notes == [f"'done' shows {value}, which says nothing of a command" for value in shown]
+    device.read((("needed", "y" * 1_000_000),))
+    assert len(device.image.readings["M.needed"].why) < 200
