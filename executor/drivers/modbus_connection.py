@@ -39,6 +39,18 @@ if TYPE_CHECKING:
 _REFUSED: Final = 0x80
 """What the function code of an answer has besides that of the request where the request is refused."""
 
+_EXCEPTIONS: Final = {
+    1: "it has not this function",
+    2: "it has no such address",
+    3: "it does not take such a value",
+    4: "it has failed",
+    5: "it will take a while",
+    6: "it is busy",
+    10: "the gateway has no way to it",
+    11: "it does not answer the gateway",
+}
+"""What the exceptions mean by which a device refuses a request (MODBUS Application Protocol, 7)."""
+
 _SAID_AGAIN: Final = ("address", "count", "and_mask", "or_mask")
 """What the answer to a write has of the request."""
 
@@ -301,7 +313,9 @@ class ModbusConnection(Stepwise):
             raise LinkError(f"an answer to another question than that for {question.what}")
         self.is_owed = False
         if shown.isError():
-            raise LinkError(f"the device refuses {question.what}: exception {shown.exception_code}")
+            code = shown.exception_code
+            meant = f" ({_EXCEPTIONS[code]})" if code in _EXCEPTIONS else ""
+            raise LinkError(f"the device refuses {question.what}: exception {code}{meant}")
         return shown
 
     async def _confirmed(self, answer: asyncio.Future[ModbusPDU], question: _Question) -> None:
