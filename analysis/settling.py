@@ -275,7 +275,9 @@ class Settling:
 
     def _told(self, name: str, outcome: Outcome[T]) -> Outcome[T]:
         """The outcome of a race about a verdict, which the course tells."""
-        said = "; ".join(outcome.told) if outcome.answer is None else f"{outcome.winner} was first"
+        said = f"{outcome.winner} was first"
+        if outcome.answer is None:
+            said = "; ".join(outcome.told) or "no technique was asked any more"
         self.course.append(f"{name}: {said}")
         if outcome.answer is None:
             self.reached[name] = said

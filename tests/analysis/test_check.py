@@ -13,7 +13,7 @@ from firable.analysis._engine import IncompleteGraph
 from firable.analysis.check import check
 from firable.analysis.goal import Limits
 from firable.analysis.methods import GOALS, KNOWERS, SPACES, Method
-from firable.analysis.race import Contestant
+from firable.analysis.race import Contestant, Outcome
 from firable.analysis.report import CheckReport, report_on
 from firable.analysis.spaces.reachability import Budget
 from firable.nets.catalogue import catalogue_net
@@ -139,3 +139,12 @@ def test_two_queries_of_one_name_are_refused() -> None:
     with pytest.raises(InputError) as refused:
         check(catalogue_net("one_robot"), queries=queries)
     assert [d.code for d in refused.value.diagnostics] == ["F2001"]
+
+
+def test_an_unknown_verdict_says_so_where_the_time_was_over_before_anybody_was_asked(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    outcome: Outcome[Any] = Outcome(None, "", ())
+    monkeypatch.setattr("firable.analysis.settling.race", lambda *_: outcome)
+    report = check(catalogue_net("one_robot"), method="pdr")
+    assert report.verdict("deadlock-free").bound == "no technique was asked any more"
