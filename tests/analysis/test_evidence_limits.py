@@ -313,3 +313,31 @@ def test_searches_for_something_smaller_share_one_part_of_the_time_where_all_mar
     assert not held.part_of_a_run().over, "what fires something has a part of its own"
     alone = producing.Spaces(net, Discipline.INTERLEAVING, limits)
     assert alone.part_of_a_search(1.0).at_seconds > limits.deadline.at_seconds - 700
+
+
+def test_evidence_of_two_ends_that_time_is_over_for_is_lacking() -> None:
+    report = check(ending_in(5, "left", "right"), method="symbolic")
+    found = evidence_of_report(report, limits=Limits(Deadline.after(0)))
+    lacking = {record.name: record.lacking for record in found.records if record.lacking}
+    assert lacking["home-markings"] == "the time for evidence was over"
+
+
+def test_evidence_is_made_of_a_diagram_where_the_explicit_engine_has_no_room_for_the_net() -> None:
+    net = family_net("machines-8")
+    report = check(net, method="symbolic")
+    found = evidence_of_report(report, limits=Limits(memory_bytes=1))
+    lacking = {record.name for record in found.records if record.lacking}
+    assert "live" not in lacking
+    assert [checked.record.name for checked in check_document(found) if not checked.shown] == sorted(lacking)
+
+
+def test_what_asks_a_space_out_of_time_beside_its_claims_is_lacking(monkeypatch: pytest.MonkeyPatch) -> None:
+    def late(*_: object) -> None:
+        raise BudgetExceeded
+
+    monkeypatch.setattr(Certifier, "run_in_order", late)
+    commands = {"p0": Command("m", "run"), "p1": Command("m", "stop")}
+    places = tuple(Place(p, marked=p == "p0", command=of) for p, of in commands.items())
+    net = Net("turns", places, (Transition("go", ("p0",), ("p1",)), Transition("back", ("p1",), ("p0",))))
+    lacking = {record.name: record.lacking for record in evidence_of_report(check(net)).records if record.lacking}
+    assert lacking == {"machine-never-stopped": "the time for evidence was over"}

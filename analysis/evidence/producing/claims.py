@@ -334,12 +334,12 @@ class Certifier:
     @cached_property
     def home(self) -> Marking | None:
         """A home marking, M0 if it is one; None where there is none or it is not known."""
-        space: StateSpace[Any] | None = self.spaces.graph or (
-            self.spaces.symbolic if self.spaces.diagram is not None else self.spaces.many
-        )
-        if space is None:
-            return None
         try:
+            space: StateSpace[Any] | None = self.spaces.graph or (
+                self.spaces.symbolic if self.spaces.diagram is not None else self.spaces.many
+            )
+            if space is None:
+                return None
             if space.reversible():
                 return self.net.initial_marking
             home = space.home()
@@ -351,9 +351,15 @@ class Certifier:
         return None if found is None else self.net.marking(found.marking)
 
     def parted(self) -> Formula | None:
-        """Something that holds for ever from one marking and never again from another: why there is no home marking."""
-        space = self.spaces.asked
-        return None if space is None else parting(space)
+        """Something that holds for ever from one marking and never again from another: why there is no home marking.
+
+        Raises `LackingError` where the time does not suffice.
+        """
+        try:
+            space = self.spaces.asked
+            return None if space is None else parting(space)
+        except (BudgetExceeded, IncompleteGraph):
+            raise LackingError(NO_TIME) from None
 
 
 def _alone(diagram: Diagram) -> Diagram:

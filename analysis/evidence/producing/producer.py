@@ -12,6 +12,7 @@ from functools import cached_property, partial
 from itertools import combinations
 from typing import Final
 
+from firable.analysis._engine import BudgetExceeded, IncompleteGraph
 from firable.analysis.evidence.by_goals import goal_claim, said_by_goals
 from firable.analysis.evidence.certificate import Certificate, FiringSequence
 from firable.analysis.evidence.checking.obligations import played
@@ -97,6 +98,8 @@ class _Verdicts:
                 shown = list(self._shown(verdict, query, proved))
             except LackingError as error:
                 lacking = str(error)
+            except (BudgetExceeded, IncompleteGraph):
+                lacking = NO_TIME  # of what was looked for beside the claims themselves
         once = {order_of(claim): (claim, certificate) for claim, certificate in reversed(shown)}
         shown = [once[key] for key in sorted(once)]  # of what is shown twice, the first
         if not self._room.take([certificate for _, certificate in shown]):

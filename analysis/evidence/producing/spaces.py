@@ -21,6 +21,7 @@ from firable.analysis.goal import Limits
 from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
 from firable.analysis.spaces.space import StateSpace
 from firable.analysis.spaces.symbolic import SymbolicSpace, explore_symbolically
+from firable.nets.diagnostics import InputError
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import Witness
 from firable.semantics.trace import Discipline
@@ -82,7 +83,10 @@ class Spaces:
             return None
         if not isinstance(graph, ReachabilityGraph) or not graph.complete:
             budget = Budget(most, self.limits.memory_bytes)
-            graph = explore(self.net, self.discipline, budget, deadline=self.part(0.2))
+            try:
+                graph = explore(self.net, self.discipline, budget, deadline=self.part(0.2))
+            except InputError:  # there is no room for the net itself, and a diagram may need less
+                return None
         return graph.until(self.limits.deadline) if graph.complete and graph.n_markings <= most else None
 
     @cached_property
