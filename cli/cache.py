@@ -3,7 +3,8 @@
 The key is a hash over the net without its descriptions, over all that the caller asked for, and over the program
 itself (the size and time of each of its files), so that an answer never outlives the code that gave it. Comments,
 layout and the bindings to hardware are in none of these: changing them keeps the answer. Only decided reports are
-kept: an unknown may be known with another budget, or on a faster day.
+kept: an unknown may be known with another budget, or on a faster day; and none that Ctrl-C ended, of which figures or
+cures may be missing.
 
 What is read back carries a checksum, and what does not fit it is no answer: it is computed anew. The cache is for the
 one who runs `check` again and again; a bundle is never made from it.
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 VARIABLE: Final = "FIRABLE_CACHE"
 """Names the folder of the cache; empty switches it off."""
 _ENTRIES_MAX: Final = 1000
+_INTERRUPTED: Final = "interrupted"  # so the course of a report tells of Ctrl-C
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,12 +65,12 @@ class Cache:
         return Kept(tuple(record.verdict() for record in records), data["figures"], tuple(data["course"]))
 
     def write(self, key: str, found: Kept) -> None:
-        """Keep what was found, unless something of it is unknown; the oldest of a thousand makes room."""
+        """Keep what was found, unless some of it is unknown or was interrupted; the oldest of a thousand makes room."""
         from firable.nets.diagnostics import InputError
         from firable.nets.verdict import Status
         from firable.nets.writing import make_folder, write_whole
 
-        cut_short = found.figures.get("structure", {}).get("ended_early")
+        cut_short = found.figures.get("structure", {}).get("ended_early") or _INTERRUPTED in found.course
         if cut_short or any(verdict.status is Status.UNKNOWN for verdict in found.verdicts):
             return
         data = {

@@ -149,3 +149,21 @@ def test_a_structure_that_its_time_cut_short_is_asked_again(
         assert main(["check", str(path), "--structure"]) == 0
     assert len(explored) == 2
     assert not (folder / "cache").exists()
+
+
+def test_what_was_decided_though_it_was_interrupted_is_asked_again(
+    folder: Path, explored: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = importlib.import_module("firable.analysis.check")
+    report_on, calls = module.report_on, list[int]()
+
+    def interrupted(*of: Any) -> CheckReport:
+        calls.append(len(calls))
+        if len(calls) == 1:
+            raise KeyboardInterrupt
+        return report_on(*of)
+
+    monkeypatch.setattr(module, "report_on", interrupted)
+    assert '"interrupted"' in checked(folder, NET, capsys, "--method", "symbolic")
+    assert '"interrupted"' not in checked(folder, NET, capsys, "--method", "symbolic")
+    assert len(explored) == 2
