@@ -69,6 +69,7 @@ from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.decompose.splitting.votes import Vote, clears, votes
 from firable.decompose.splitting.walking import fallen
 from firable.nets.decomposition import Decomposition
+from firable.nets.diagnostics import InputError
 from firable.nets.formula import Formula, Not
 from firable.nets.knowledge import undisturbing
 from firable.nets.net import Net
@@ -284,9 +285,12 @@ class _Deciding:
     def _held(self) -> StateSpace[Any] | None:
         """All markings, where a moment finds them or a diagram holds them."""
         budget = Budget(FIRST_MARKINGS, self.limits.memory_bytes)
-        graph = explore(self.net, Discipline.INTERLEAVING, budget, deadline=self.limits.deadline)
-        if graph.complete:
-            return graph
+        try:
+            graph = explore(self.net, Discipline.INTERLEAVING, budget, deadline=self.limits.deadline)
+            if graph.complete:
+                return graph
+        except InputError:
+            pass  # there is no room for the net itself, and a diagram may need less
         deadline = self.limits.deadline.within(_share(self.limits.deadline, _DIAGRAM_SHARE))
         try:
             return explore_symbolically(self.net, Limits(deadline, self.limits.memory_bytes)).until(

@@ -161,7 +161,8 @@ def test_what_was_decided_though_it_was_interrupted_is_asked_again(
         calls.append(len(calls))
         if len(calls) == 1:
             raise KeyboardInterrupt
-        return report_on(*of)
+        report: CheckReport = report_on(*of)
+        return report
 
     monkeypatch.setattr(module, "report_on", interrupted)
     assert '"interrupted"' in checked(folder, NET, capsys, "--method", "symbolic")

@@ -439,3 +439,10 @@ def test_a_sensor_that_may_drop_excludes_nothing_and_a_completion_that_stays_doe
     )
     assert found.of(part).holds == stands
     agree(decomposition, found)
+
+
+def test_votes_of_a_net_that_the_explicit_engine_has_no_room_for_are_settled_or_unknown() -> None:
+    decomposition = split(catalogue_net("one_robot_mc_late"))
+    whole = {verdict.name: verdict.status for verdict in persistence(decomposition).verdicts}
+    for verdict in persistence(decomposition, limits=Limits(memory_bytes=1)).verdicts:
+        assert verdict.status in {whole[verdict.name], Status.UNKNOWN}
