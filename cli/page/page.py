@@ -16,6 +16,7 @@ from firable.cli.page.sections import refuted, sections
 from firable.cli.page.style import STYLE
 from firable.cli.report import Report
 from firable.cli.text import counted, endings, good_end
+from firable.nets.source import printable
 from firable.nets.verdict import Status, Verdict, overall
 
 _ASKED: Final = {
@@ -69,6 +70,7 @@ def _masthead(report: Report) -> Markup:
             tag("h1", net.name or "the net"),
             tag("p", net.description) if net.description else None,
             tag("p", ", ".join(counted(n, word) for n, word in sizes if n), _explored(report)),
+            tag("p", f"{printable(report.binding)} binds each signal and command") if report.binding else None,
             tag("div", _overall_badge(report.verdicts), tag("ul", counts, cls="counts"), cls="verdict-line"),
             _failing(report),
         ),

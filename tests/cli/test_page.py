@@ -159,6 +159,13 @@ def test_whatever_a_net_is_called_is_text() -> None:
     assert page.words.count("alert('x')") >= 6
 
 
+def test_the_page_names_the_binding_that_fits() -> None:
+    report = report_with(Verdict("deadlock", Status.PROVED, "it never stands still", "explored"))
+    assert "binds each signal" not in Reading(page_of(report)).words
+    page = page_of(replace(report, binding="cell.bind.yaml"))
+    assert "cell.bind.yaml binds each signal and command" in Reading(page).words
+
+
 def test_a_verdict_of_a_kind_that_nobody_knows_appears_with_its_run() -> None:
     foreign = Witness((("ask G1",), ("yes t0-1", "yes t3-13")), (("ask G2",),), note="G1 is lost")
     verdict = Verdict("new-kind.of.thing", Status.VIOLATED, "nothing is lost", "by some method", witness=foreign)
