@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from copy import copy
 from functools import wraps
 from importlib import import_module
+from stat import S_ISCHR
 from typing import Any, TextIO
 
 import click
@@ -184,7 +185,9 @@ def _unread() -> int:
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
-        except BrokenPipeError:
+        except OSError as error:
+            if error.errno not in {errno.EPIPE, errno.EIO}:
+                raise
             _to_nowhere(stream)
     return ExitCode.UNKNOWN
 
@@ -218,6 +221,9 @@ def _ended_by(error: Exception, arguments: Sequence[str]) -> int:
                 err=True,
             )
             return ExitCode.INPUT_ERROR
+        case OSError(errno=errno.EIO, filename=None) if S_ISCHR(os.fstat(sys.stdout.fileno()).st_mode):
+            _to_nowhere(sys.stdout)  # a terminal that is closed is no disk
+            return _unread()
         case OSError() if error.filename is None and error.errno in FULL:
             # Whoever writes a file has said which: this is what is printed.
             _to_nowhere(sys.stdout)

@@ -1,6 +1,7 @@
 """How a command ends whose output goes nowhere, or that Ctrl-C meets before it has begun."""
 
 import os
+import pty
 import subprocess
 import sys
 from pathlib import Path
@@ -24,6 +25,16 @@ def test_a_disk_that_is_full_under_the_output_is_one_clear_error(arguments: list
         "error[F1017]: standard output cannot be written: No space left on device\n"
         "  hint: make room where it goes, or send it elsewhere\n"
     )
+
+
+@pytest.mark.parametrize("arguments", [*SAYS_TOO_MUCH, ["schema", "net"]])
+def test_a_terminal_that_is_closed_has_no_reader_as_a_broken_pipe(arguments: list[str]) -> None:
+    side, terminal = pty.openpty()
+    os.close(side)
+    done = subprocess.run([*FIRABLE, *arguments], stdout=terminal, stderr=subprocess.PIPE, check=False)
+    assert (done.returncode, done.stderr) == (3, b"")
+    assert subprocess.run([*FIRABLE, *arguments], stdout=terminal, stderr=terminal, check=False).returncode == 3
+    os.close(terminal)
 
 
 @pytest.mark.parametrize("arguments", [["check", "nowhere.firable.yaml"], ["check"]])
