@@ -180,6 +180,11 @@ def _run(arguments: Sequence[str]) -> int:
     return int(code or 0)
 
 
+def _is_hung_up(stream: TextIO) -> bool:
+    """Whether a stream is a terminal that was closed at its other side: a device still, and a terminal no more."""
+    return S_ISCHR(os.fstat(stream.fileno()).st_mode) and not stream.isatty()
+
+
 def _unread() -> int:
     """Whoever read our output has gone (`firable ... | head`). What is still buffered has no reader."""
     for stream in (sys.stdout, sys.stderr):
@@ -221,8 +226,8 @@ def _ended_by(error: Exception, arguments: Sequence[str]) -> int:
                 err=True,
             )
             return ExitCode.INPUT_ERROR
-        case OSError(errno=errno.EIO, filename=None) if S_ISCHR(os.fstat(sys.stdout.fileno()).st_mode):
-            _to_nowhere(sys.stdout)  # a terminal that is closed is no disk
+        case OSError(errno=errno.EIO, filename=None) if _is_hung_up(sys.stdout):
+            _to_nowhere(sys.stdout)
             return _unread()
         case OSError() if error.filename is None and error.errno in FULL:
             # Whoever writes a file has said which: this is what is printed.
