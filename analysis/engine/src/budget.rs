@@ -140,18 +140,20 @@ impl Memory {
 
 /// Units of work between two looks at the clock.
 pub(crate) const CLOCK_EVERY: usize = 1 << 12;
+/// Units of work before the first call of `poll`.
+const FIRST_POLL: usize = 1 << 16;
 /// The longest time between two calls of `poll`. By the clock and not by work: a caller may have to wait for its turn
 /// (the interpreter lock) at each call, and what a unit of work takes differs by a factor of a thousand.
 const POLL_EVERY: Duration = Duration::from_millis(40);
-/// Time before the first call of `poll`.
-const FIRST_POLL: Duration = Duration::from_millis(1);
+/// The shortest time between two calls of `poll`.
+const POLL_EVERY_MIN: Duration = Duration::from_millis(1);
 /// The part of the time since the start that passes until the next call, up to the longest: work whose answer is no
 /// longer needed, as another technique has it, then goes on for no more than that part of what it has taken already.
 const POLL_PART: u32 = 4;
 
 /// How long work that has gone on for so long does without a call of `poll`.
 fn until_next_poll(elapsed: Duration) -> Duration {
-    (elapsed / POLL_PART).clamp(FIRST_POLL, POLL_EVERY)
+    (elapsed / POLL_PART).clamp(POLL_EVERY_MIN, POLL_EVERY)
 }
 
 /// What was found so far: what `poll` is told.
@@ -173,6 +175,8 @@ pub struct Watch<'a> {
     deadline: Option<Instant>,
     poll: &'a mut dyn FnMut(Found) -> Result<(), Stop>,
     since_clock: usize,
+    /// Work left before the first call of `poll`, which soon follows the start.
+    before_first: Option<usize>,
     started: Instant,
     polled: Instant,
     poll_every: Duration,
@@ -183,17 +187,18 @@ pub struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    /// `poll` is called soon after the start, then more and more seldom, and at last some twenty times a second; it says
-    /// whether to stop and why.
+    /// `poll` is called after 2^16 units of work, then more and more seldom, and at last some twenty times a second; it
+    /// says whether to stop and why.
     pub fn new(deadline: Option<Instant>, poll: &'a mut dyn FnMut(Found) -> Result<(), Stop>) -> Self {
         let now = Instant::now();
         Watch {
             deadline,
             poll,
             since_clock: 0,
+            before_first: Some(FIRST_POLL),
             started: now,
             polled: now,
-            poll_every: FIRST_POLL,
+            poll_every: POLL_EVERY,
             poll_every_max: POLL_EVERY,
             second: None,
             found: Found::default(),
@@ -202,7 +207,8 @@ impl<'a> Watch<'a> {
 
     /// The same with a `poll` that costs nothing and is called at each look at the clock.
     pub(crate) fn often(deadline: Option<Instant>, poll: &'a mut dyn FnMut(Found) -> Result<(), Stop>) -> Self {
-        Watch { poll_every: Duration::ZERO, poll_every_max: Duration::ZERO, ..Watch::new(deadline, poll) }
+        let none = Duration::ZERO;
+        Watch { before_first: None, poll_every: none, poll_every_max: none, ..Watch::new(deadline, poll) }
     }
 
     /// The same for work that a second thread may share while this says that a processor is free for it.
@@ -233,8 +239,11 @@ impl<'a> Watch<'a> {
         if self.deadline.is_some_and(|deadline| now >= deadline) {
             return Err(Stop::Time);
         }
+        self.before_first = self.before_first.map(|left| left.saturating_sub(self.since_clock));
+        let due = self.before_first == Some(0) || now.duration_since(self.polled) >= self.poll_every;
         self.since_clock = 0;
-        if now.duration_since(self.polled) >= self.poll_every {
+        if due {
+            self.before_first = None;
             (self.poll)(self.found)?;
             self.polled = Instant::now();
             self.poll_every = until_next_poll(self.polled.duration_since(self.started)).min(self.poll_every_max);
@@ -250,7 +259,7 @@ mod tests {
     #[test]
     fn what_is_no_longer_needed_goes_on_for_a_part_of_what_it_took() {
         let after = |millis| until_next_poll(Duration::from_millis(millis));
-        assert_eq!(after(0), FIRST_POLL);
+        assert_eq!(after(0), POLL_EVERY_MIN);
         assert_eq!(after(20), Duration::from_millis(5));
         assert_eq!(after(100_000), POLL_EVERY);
     }

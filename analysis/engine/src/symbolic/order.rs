@@ -304,7 +304,14 @@ mod tests {
     #[test]
     fn the_making_of_orders_ends_in_time() {
         let transitions = ring(1000);
-        for last in 0..4 {
+        let mut polls = 0;
+        let mut poll = |_| {
+            polls += 1;
+            Err(Stop::Cancelled)
+        };
+        let stopped = Candidates::new(1000, &transitions, &mut Watch::new(None, &mut poll)).map(|_| ());
+        assert_eq!((stopped, polls), (Err(Stop::Cancelled), 1));
+        for last in 1..4 {
             let mut polls = 0;
             let mut poll = |_| {
                 polls += 1;
