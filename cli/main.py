@@ -18,7 +18,6 @@ from collections.abc import Sequence
 from copy import copy
 from functools import wraps
 from importlib import import_module
-from stat import S_ISCHR
 from typing import Any, TextIO
 
 import click
@@ -181,8 +180,16 @@ def _run(arguments: Sequence[str]) -> int:
 
 
 def _is_hung_up(stream: TextIO) -> bool:
-    """Whether a stream is a terminal that was closed at its other side: a device still, and a terminal no more."""
-    return S_ISCHR(os.fstat(stream.fileno()).st_mode) and not stream.isatty()
+    """Whether a stream is a terminal that was closed at its other side, as another device, /dev/null, never is."""
+    import termios
+
+    try:
+        termios.tcgetattr(stream.fileno())
+    except termios.error as error:
+        return bool(error.args[0] == errno.EIO)
+    except (OSError, ValueError):
+        return False
+    return False
 
 
 def _unread() -> int:

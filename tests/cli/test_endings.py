@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from firable.cli.main import _is_hung_up
+
 FIRABLE = [sys.executable, "-m", "firable.cli"]
 SAYS_TOO_MUCH = [["check", "catalogue:one_robot"], ["check", "catalogue:one_robot", "--format", "json"], ["--help"]]
 
@@ -67,3 +69,8 @@ runpy.run_module("firable.cli", run_name="__main__", alter_sys=True)
 """
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr.strip()) == (3, "", "interrupted: nothing is known yet")
+
+
+def test_a_device_that_is_no_terminal_is_no_closed_one() -> None:
+    with Path("/dev/null").open("w") as nowhere:
+        assert not _is_hung_up(nowhere)
