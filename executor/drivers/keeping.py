@@ -8,6 +8,7 @@ earlier. A connection that has failed in any way is closed and never asked again
 that doubles up to a bound, and is read before it is written, because what the device shows then decides what is still
 to be sent. The pause is short again when a connection has stood for as long as an answer or a sign of life may take: a
 device that can be read and refuses what is written to it would else be connected, and told of, ten times a second.
+After an emergency stop it is short also then, as each connection brings the safe outputs.
 
 A stop breaks off a command that is being written, if it is not confirmed at once, and makes new connections until the
 device has confirmed the safe outputs, or has had its time. On these, and on each connection after an emergency stop,
@@ -249,7 +250,7 @@ class Kept:
                 await self._connected()
             except _FAILURES as error:
                 self.served.lost(str(error) or "no answer in time")
-            if self.stood_seconds >= enough_s:
+            if self.stood_seconds >= enough_s or (self.stood_seconds and self.served.is_latched):
                 pause_s = self.document.retry_s
             with suppress(TimeoutError):
                 await asyncio.wait_for(self._asked_to_stop(), pause_s)

@@ -22,7 +22,6 @@ from base64 import b64decode, b64encode
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from importlib import import_module
-from math import inf
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any, Final, Literal
@@ -112,7 +111,8 @@ class OpcUaConnection(Stepwise):
 
     async def open(self, every_s: float) -> None:
         """Connect, and subscribe to what is wanted."""
-        from asyncua.ua.uaprotocol_auto import CreateSubscriptionParameters, CreateSubscriptionResult
+        from asyncua.common.subscription import Subscription
+        from asyncua.ua.uaprotocol_auto import CreateSubscriptionParameters, ModifySubscriptionParameters
         from asyncua.ua.uatypes import Byte, Double, UInt32
 
         self.client.connection_lost_callback = self._lost
@@ -120,30 +120,46 @@ class OpcUaConnection(Stepwise):
         drop_at_close(self._transport)
         nodes = [self.client.get_node(point) for point in self.wanted.read]
         self.points = {node.nodeid.to_string(): point for node, point in zip(nodes, self.wanted.read, strict=True)}
-        signs = max(1, int(self.wanted.timeout_s / SIGNS / every_s))
+        counts = self._counts(every_s)
         asked = CreateSubscriptionParameters(
             RequestedPublishingInterval=Double(1000 * every_s),
-            RequestedLifetimeCount=UInt32(max(10_000, 3 * signs)),
-            RequestedMaxKeepAliveCount=UInt32(signs),
+            RequestedLifetimeCount=UInt32(counts[0]),
+            RequestedMaxKeepAliveCount=UInt32(counts[1]),
             MaxNotificationsPerPublish=UInt32(10_000),
             PublishingEnabled=True,
             Priority=Byte(0),
         )
-        given: list[CreateSubscriptionResult] = []
-        # As the server has it: asyncua would ask for its own long silence again where the server has another interval.
-        setattr(self.client, "get_subscription_revised_params", lambda _, result: given.append(result))  # noqa: B010
-        self.client._stale_check_margin = inf
-        subscription = await self.client.create_subscription(asked, self)
+        # Not one of the client, which would subscribe anew by itself, and have the server say seldom that it is there.
+        subscription = Subscription(self.client.uaclient.session, asked, self)
+        given = await subscription.init()
+        every_s = given.RevisedPublishingInterval / 1000
+        signs: int = given.RevisedMaxKeepAliveCount
+        if given.RevisedPublishingInterval != asked.RequestedPublishingInterval:
+            counts = self._counts(every_s)
+            changed = ModifySubscriptionParameters(
+                SubscriptionId=given.SubscriptionId,
+                RequestedPublishingInterval=given.RevisedPublishingInterval,
+                RequestedLifetimeCount=UInt32(counts[0]),
+                RequestedMaxKeepAliveCount=UInt32(counts[1]),
+                MaxNotificationsPerPublish=asked.MaxNotificationsPerPublish,
+                Priority=asked.Priority,
+            )
+            kept = await self.client.uaclient.session.update_subscription(changed)
+            every_s, signs = kept.RevisedPublishingInterval / 1000, kept.RevisedMaxKeepAliveCount
         if (publishing := self.client.uaclient.session._publish_task) is not None:
             publishing.add_done_callback(self._ended)
         if nodes:
             several: Iterable[Node] = nodes
-            silence_s = given[0].RevisedPublishingInterval / 1000 * max(1, given[0].RevisedMaxKeepAliveCount)
-            self._look(subscription, silence_s + self.wanted.timeout_s, monotonic())
+            self._look(subscription, every_s * max(1, signs) + self.wanted.timeout_s, monotonic())
             made = await subscription.subscribe_data_change(several, queuesize=QUEUE, sampling_interval=Double(0))
             for point, one in zip(self.wanted.read, made, strict=True):
                 if not isinstance(one, int):
                     raise LinkError(f"the server does not let '{point}' be read: {one.name}")
+
+    def _counts(self, every_s: float) -> tuple[int, int]:
+        """After how many intervals the server may drop the subscription, and is to say that it is there (Part 4)."""
+        signs = max(1, int(self.wanted.timeout_s / SIGNS / max(every_s, 0.001)))
+        return max(10_000, 3 * signs), signs
 
     async def read(self) -> Sequence[tuple[Point, Value]]:
         """All changes that have come; at first, what every node holds."""

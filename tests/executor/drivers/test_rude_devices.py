@@ -56,6 +56,15 @@ class Refusing:
     load = TCP.load
 
 
+class RefusingLater(Refusing):
+    """A device that takes the safe outputs, and refuses a heartbeat."""
+
+    async def write(self, writes: Writes) -> None:
+        """Take what is safe."""
+        if writes[0][0] != "holding 1":
+            await super().write(writes)
+
+
 @pytest.mark.parametrize("is_stable", [False, True])
 def test_the_pause_before_a_new_connection_grows_until_one_has_stood_for_a_while(is_stable: bool) -> None:
     async def main() -> list[float]:
@@ -77,6 +86,30 @@ def test_the_pause_before_a_new_connection_grows_until_one_has_stood_for_a_while
         assert sum(pauses) < sum(grown)
     else:
         assert all(pause > 0.9 * least for pause, least in zip(pauses, grown, strict=True))
+
+
+class Latched(Nobody):
+    """Somebody who is served after an emergency stop."""
+
+    is_latched = True
+
+
+def test_after_an_emergency_stop_the_pause_does_not_grow_where_each_connection_brings_the_safe_outputs() -> None:
+    async def main() -> list[float]:
+        device = RefusingLater()
+        document = parse_binding(
+            FLAPPING.replace("TIMEOUT", "10").replace("heartbeat:", "safe: {holding 1: 0}, heartbeat:")
+        ).document.devices["D"]
+        kept = Kept(document, device, TcpOptions(host="h"), Wanted(("discrete 0",), 10.0), Latched())
+        task = asyncio.create_task(kept.run())
+        await until(lambda: len(device.connections_at) == 6, "six connections")
+        at = list(device.connections_at)
+        kept.stop()
+        await task
+        return at
+
+    at = asyncio.run(main())
+    assert at[-1] - at[0] < sum([0.02, 0.04, 0.08, 0.16, 0.32])
 
 
 def test_a_signal_that_shows_one_thing_after_the_other_that_is_no_value_is_a_fault_once() -> None:
