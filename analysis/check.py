@@ -134,7 +134,7 @@ class _Check:
     def explicitly(self) -> CheckReport:
         """The report of the explicit engine alone, within the whole budget."""
         graph = self._explore(self.budget, threads=2)
-        return _told(self._report(graph), [f"explored: {_size(graph)}"])
+        return self._explored(graph)
 
     def automatically(self) -> CheckReport:
         """The report of the three stages, as far as they are needed."""
@@ -143,7 +143,7 @@ class _Check:
         except InputError as error:
             return self._without_a_graph(error)
         if first.complete or first.engine.reason == "interrupted":
-            return _told(self._report(first), [f"explored: {_size(first)}"])
+            return self._explored(first)
         course = [f"the first {first.n_markings:,} markings are not all"]
         settling = self._settling()
         ends: list[str | None] = []
@@ -240,6 +240,11 @@ class _Check:
                 raise
             self.interrupted.set()
             return _told(report_on(space, self.queries, known), ["interrupted"])
+
+    def _explored(self, graph: ReachabilityGraph) -> CheckReport:
+        """The report on a graph, and whether Ctrl-C ended the graph: then its figures are not those of the net."""
+        ended = ["interrupted"] if graph.engine.reason == "interrupted" else []
+        return _told(self._report(graph), [f"explored: {_size(graph)}", *ended])
 
     def _explore(self, budget: Budget, threads: int = 1) -> ReachabilityGraph:
         """Some markings, or all; by as many threads whatever the machine, since they say how markings are numbered."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 
 from firable.analysis.check import check
 from firable.analysis.report import CheckReport
+from firable.analysis.spaces.reachability import ReachabilityGraph
 from firable.cli.cache import key_of
 from firable.cli.main import main
 from firable.nets.catalogue import catalogue_net
@@ -23,6 +25,17 @@ transitions:
   t: {from: a.p, to: a.q}
   u: {from: a.q, to: a.p}
 """
+
+
+@dataclass(frozen=True)
+class _Interrupted:
+    """A graph of the engine that Ctrl-C has ended."""
+
+    graph: Any
+    reason: str = "interrupted"
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.graph, name)
 
 
 @pytest.fixture
@@ -168,3 +181,23 @@ def test_what_was_decided_though_it_was_interrupted_is_asked_again(
     assert '"interrupted"' in checked(folder, NET, capsys, "--method", "symbolic")
     assert '"interrupted"' not in checked(folder, NET, capsys, "--method", "symbolic")
     assert len(explored) == 2
+
+
+def test_an_exploration_that_was_interrupted_is_not_kept_though_it_decided_all(
+    folder: Path, explored: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = importlib.import_module("firable.analysis.check")
+    explore = module.explore
+
+    def interrupted(*of: Any, **by: Any) -> ReachabilityGraph:
+        graph: ReachabilityGraph = explore(*of, **by)
+        engine: Any = _Interrupted(graph.engine)
+        return replace(graph, engine=engine)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "explore", interrupted)
+        assert '"interrupted"' in checked(folder, NET, capsys, "--method", "explicit")
+        assert '"interrupted"' in checked(folder, NET, capsys)
+    for method in ((), ("--method", "explicit")):
+        assert '"interrupted"' not in checked(folder, NET, capsys, *method)
+    assert len(explored) == 4
