@@ -85,6 +85,28 @@ class TestOpcUa(DriverConformance):
 
         self.run(main())
 
+    def test_a_subscription_that_the_server_says_it_has_not_ends_the_connection_at_once(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Long before its signs of life are missed."""
+        from asyncua.client.ua_session import UaSession
+        from asyncua.ua.uaerrors import BadNoSubscription
+
+        async def none(*_args: Any) -> None:
+            raise BadNoSubscription
+
+        async def main() -> None:
+            await self.end.start(lambda _point, _value: None)
+            monkeypatch.setattr(UaSession, "publish", none)
+            options = OpcUaOptions(url=f"opc.tcp://127.0.0.1:{self.end.port}/")
+            connection = await KIND.connect(options, Wanted((POINTS["sensor"],), 10 * PATIENCE_S))
+            with pytest.raises(LinkError, match="has dropped the subscription"):
+                await asyncio.wait_for(connection.read(), PATIENCE_S)
+            await connection.close()
+            await self.end.stop()
+
+        self.run(main())
+
 
 def test_a_server_that_takes_a_connection_and_says_nothing_has_not_answered_in_time() -> None:
     async def main() -> None:
