@@ -27,6 +27,7 @@ from firable.cli.votes import Votes, votes_told
 
 if TYPE_CHECKING:
     from firable.decompose.splitting.persistence import Persistence
+    from firable.decompose.splitting.rules import Rules
     from firable.decompose.splitting.suggesting import Suggestion
     from firable.nets.decomposition import Decomposition
     from firable.nets.net import Net
@@ -154,7 +155,7 @@ def _report(argument: str, asked: _Asked, output: str | None, subnet_dir: str | 
     )
 
 
-def _rules(asked: _Asked) -> dict[str, list[str]]:
+def _rules(asked: _Asked) -> Rules:
     """The rules of ownership that the options give, whose mistakes are nowhere in the file of the net."""
     from firable.decompose.splitting.rules import read_rules, rules_of_options
 
@@ -164,7 +165,7 @@ def _rules(asked: _Asked) -> dict[str, list[str]]:
     return rules
 
 
-def _owned(net: Net, asked: _Asked, rules: dict[str, list[str]]) -> tuple[Net, Suggestion | None]:
+def _owned(net: Net, asked: _Asked, rules: Rules) -> tuple[Net, Suggestion | None]:
     """The net with the owners that were asked for."""
     from firable.analysis.deadline import Deadline
     from firable.decompose.splitting.rules import owned_by_rules

@@ -18,20 +18,31 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from collections.abc import Mapping as Table
+from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Final
 
-from firable.nets.diagnostics import Diagnostic, InputError, Subject
+from firable.nets.diagnostics import Diagnostic, InputError, Span, Subject
 from firable.nets.net import Controller, Net
 from firable.nets.owning import with_owners
 from firable.nets.source import read_source
-from firable.nets.yaml_tree import Mapping, data, node_span, parse_tree
+from firable.nets.yaml_tree import Mapping, Node, Scalar, data, node_span, parse_tree
+from firable.nets.yaml_tree import Sequence as List
 
 SIZE_BYTES_MAX: Final = 1024 * 1024
 _HINT: Final = "write `CONTROLLER: PATTERN`, or `CONTROLLER: [PATTERN, PATTERN]`"
 
-Rules = Table[str, Sequence[str]]
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    """What names look like, and where that stands in a file of rules."""
+
+    text: str
+    span: Span | None = field(default=None, compare=False)
+
+
+Rules = Table[str, Sequence[Pattern]]
 """For each controller, in their order, the patterns of what it owns."""
 
 
@@ -46,10 +57,10 @@ def owned_by_rules(net: Net, rules: Rules) -> Net:
     by_rule: dict[str, list[str]] = {name: [] for name in names}
     for controller, patterns in rules.items():
         for pattern in patterns:
-            matched = [name for name in names if fnmatchcase(name, pattern)]
+            matched = [name for name in names if fnmatchcase(name, pattern.text)]
             if not matched:
-                message = f"no place or signal is named like '{pattern}', which shall belong to '{controller}'"
-                problems.append(Diagnostic("F2002", message, "correct the pattern, or take it out"))
+                message = f"no place or signal is named like '{pattern.text}', which shall belong to '{controller}'"
+                problems.append(Diagnostic("F2002", message, "correct the pattern, or take it out", span=pattern.span))
             for name in matched:
                 if controller not in by_rule[name]:
                     by_rule[name].append(controller)
@@ -98,37 +109,37 @@ def _follow(net: Net, by_rule: dict[str, list[str]]) -> None:
             by_rule[name] = list(owners)
 
 
-def rules_of_options(options: Iterable[str]) -> dict[str, list[str]]:
+def rules_of_options(options: Iterable[str]) -> dict[str, list[Pattern]]:
     """The rules of options `CONTROLLER=PATTERN[,PATTERN]`; raises `InputError` F1010 for any other text.
 
-    >>> rules_of_options(["robot=r_*,free", "mc=m_*"])
-    {'robot': ['r_*', 'free'], 'mc': ['m_*']}
+    >>> rules_of_options(["robot=r_*,free"])
+    {'robot': [Pattern(text='r_*', span=None), Pattern(text='free', span=None)]}
     """
-    rules: dict[str, list[str]] = {}
+    rules: dict[str, list[Pattern]] = {}
     for option in options:
         controller, equals, patterns = option.partition("=")
-        found = [pattern.strip() for pattern in patterns.split(",")]
-        if not controller or not equals or not all(found):
+        found = [Pattern(pattern.strip()) for pattern in patterns.split(",")]
+        if not controller or not equals or not all(pattern.text for pattern in found):
             message = f"'{option}' is no rule of ownership"
             raise InputError([Diagnostic("F1010", message, "write CONTROLLER='PATTERN', such as robot='r_*,free'")])
         rules.setdefault(controller, []).extend(found)
     return rules
 
 
-def read_rules(path: str | Path) -> dict[str, list[str]]:
+def read_rules(path: str | Path) -> dict[str, list[Pattern]]:
     """The rules of a file. Raises `InputError` as for a net file, F1010 for what is no rule."""
     source = read_source(path, SIZE_BYTES_MAX)
     tree = parse_tree(source, "file of rules", f"a controller: {_HINT}")
     problems: list[Diagnostic] = []
-    rules: dict[str, list[str]] = {}
+    rules: dict[str, list[Pattern]] = {}
     if not isinstance(tree, Mapping) or not tree.entries:
         message = "a file of rules is a mapping of controllers to patterns"
         raise InputError([Diagnostic("F1010", message, _HINT, span=node_span(source, tree))])
     for controller, (key, said) in tree.entries.items():
-        found = data(said)
-        patterns = [one for one in found if isinstance(one, str) and one] if isinstance(found, list) else [found]
-        if isinstance(found, str) or (isinstance(found, list) and found and len(patterns) == len(found)):
-            rules[controller] = [one for one in patterns if isinstance(one, str)]
+        several: Sequence[Node] = said.items if isinstance(said, List) else (said,)
+        patterns = [one for one in several if isinstance(one, Scalar) and one.text and isinstance(data(one), str)]
+        if patterns and len(patterns) == len(several):
+            rules[controller] = [Pattern(one.text, node_span(source, one)) for one in patterns]
         else:
             message = f"'{controller}' is given no pattern"
             problems.append(Diagnostic("F1010", message, _HINT, (controller,), node_span(source, key)))

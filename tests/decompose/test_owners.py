@@ -20,7 +20,7 @@ from firable.decompose.splitting import partitioning
 from firable.decompose.splitting.cut import split
 from firable.decompose.splitting.hypergraph import Hypergraph, hypergraph
 from firable.decompose.splitting.partitioning import partition
-from firable.decompose.splitting.rules import owned_by_rules, read_rules, rules_of_options
+from firable.decompose.splitting.rules import Rules, owned_by_rules, read_rules, rules_of_options
 from firable.decompose.splitting.suggesting import suggest
 from firable.nets.catalogue import catalogue_names, catalogue_net, family_net
 from firable.nets.diagnostics import InputError
@@ -51,7 +51,11 @@ def bare(net: Net) -> Net:
     )
 
 
-def problems(net: Net, rules: dict[str, list[str]]) -> list[tuple[str, tuple[str, ...]]]:
+def patterns(**rules: str) -> Rules:
+    return rules_of_options(f"{controller}={spelled}" for controller, spelled in rules.items())
+
+
+def problems(net: Net, rules: Rules) -> list[tuple[str, tuple[str, ...]]]:
     with pytest.raises(InputError) as refusal:
         owned_by_rules(net, rules)
     assert all(diagnostic.hint for diagnostic in refusal.value.diagnostics)
@@ -75,7 +79,7 @@ SMALL = Net(
 
 
 def test_rules_own_what_they_match_and_what_is_joined_follows() -> None:
-    owned = owned_by_rules(SMALL, {"robot": ["r_*", "door"], "mc": ["m_*"]})
+    owned = owned_by_rules(SMALL, patterns(robot="r_*,door", mc="m_*"))
     assert [place.name for place in owned.places] == ["robot.r_go", "robot.r_free", "mc.m_full"]
     assert [signal.name for signal in owned.signals] == ["robot.done", "robot.door", "mc.full"]
     assert owned.place("robot.r_go").completion == "robot.done"
@@ -83,21 +87,21 @@ def test_rules_own_what_they_match_and_what_is_joined_follows() -> None:
 
 
 def test_a_sensor_that_gates_transitions_of_several_controllers_needs_a_rule() -> None:
-    assert problems(SMALL, {"robot": ["r_*"], "mc": ["m_*"]}) == [("F2011", ("signals", "door"))]
+    assert problems(SMALL, patterns(robot="r_*", mc="m_*")) == [("F2011", ("signals", "door"))]
 
 
 def test_a_place_of_no_rule_and_one_of_two_are_refused_together() -> None:
-    found = problems(SMALL, {"robot": ["r_*", "door"], "other": ["*_free"]})
+    found = problems(SMALL, patterns(robot="r_*,door", other="*_free"))
     assert found == [("F2023", ("places", "r_free")), ("F2011", ("places", "m_full")), ("F2011", ("signals", "full"))]
 
 
 def test_a_pattern_that_matches_nothing_is_refused() -> None:
-    assert ("F2002", ()) in problems(SMALL, {"robot": ["r_*", "door", "x_*"], "mc": ["m_*"]})
+    assert ("F2002", ()) in problems(SMALL, patterns(robot="r_*,door,x_*", mc="m_*"))
 
 
 def test_rules_give_the_cell_back_the_owners_that_its_names_tell() -> None:
     net = catalogue_net("one_robot")
-    rules = {controller.name: [f"{controller.name}.*"] for controller in net.controllers}
+    rules = patterns(**{controller.name: f"{controller.name}.*" for controller in net.controllers})
     owned = owned_by_rules(net, rules)
     assert owned == net
     assert [row.name for row in split(owned_by_rules(bare(net), rules)).table] == [f"G{n}" for n in range(1, 10)]
@@ -106,7 +110,24 @@ def test_rules_give_the_cell_back_the_owners_that_its_names_tell() -> None:
 def test_rules_are_read_from_a_file(tmp_path: Path) -> None:
     path = tmp_path / "owners.yaml"
     path.write_text("robot: [r_*, door]\nmc: m_*\n", encoding="utf-8")
-    assert read_rules(path) == {"robot": ["r_*", "door"], "mc": ["m_*"]}
+    assert read_rules(path) == patterns(robot="r_*,door", mc="m_*")
+
+
+def test_a_pattern_of_a_file_that_matches_nothing_is_refused_where_it_stands(tmp_path: Path) -> None:
+    path = tmp_path / "owners.yaml"
+    path.write_text("robot: [r_*, door]\nmc:\n  - m_*\n  - x_*\n", encoding="utf-8")
+    with pytest.raises(InputError) as refusal:
+        owned_by_rules(SMALL, read_rules(path))
+    (problem,) = refusal.value.diagnostics
+    assert (problem.code, str(problem.span)) == ("F2002", f"{path}:4:5")
+
+
+@pytest.mark.parametrize("text", ["robot: true\n", "robot: [r_*, true]\n", "robot: []\n", "robot: [[r_*]]\n"])
+def test_what_is_no_pattern_is_refused(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "owners.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match="F1010"):
+        read_rules(path)
 
 
 @pytest.mark.parametrize(("text", "line"), [("robot:\nmc: m_*\n", 1), ("mc: m_*\nrobot: {a: b}\n", 2), ("[a]\n", 1)])
@@ -229,11 +250,11 @@ transitions:
   a: {from: a.free, to: a.go}
   b: {from: b.free, to: b.go}
 """)
-    both = owned_by_rules(net, {"m": ["a.*", "b.*"], "n": ["c.*"]})
+    both = owned_by_rules(net, patterns(m="a.*,b.*", n="c.*"))
     assert [place.within and place.within.timer for place in both.places] == [
         None, "m.a_go_overdue", None, None, "m.b_go_overdue", None, None
     ]  # fmt: skip
-    one = owned_by_rules(net, {"m": ["a.*", "c.*"], "n": ["b.*"]})
+    one = owned_by_rules(net, patterns(m="a.*,c.*", n="b.*"))
     assert one.place("m.a_go").within == TimeLimit(1000, "m.go_overdue")
     assert one.transition("a.go_timeout").description == "m.there has not come within 1s"
     for owned in (both, one):

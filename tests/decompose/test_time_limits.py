@@ -16,7 +16,7 @@ from firable.decompose.protocol.outages import outages
 from firable.decompose.protocol.parametric.side_conditions import side_conditions
 from firable.decompose.splitting.cut import split
 from firable.decompose.splitting.hypergraph import hypergraph
-from firable.decompose.splitting.rules import owned_by_rules
+from firable.decompose.splitting.rules import owned_by_rules, rules_of_options
 from firable.decompose.splitting.votes import votes
 from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.checking import check_bundle
@@ -142,14 +142,14 @@ def test_a_place_its_timer_and_its_fault_place_stand_in_one_block() -> None:
 
 
 def test_timer_and_fault_place_follow_their_place_where_no_rule_speaks_of_them() -> None:
-    owned = owned_by_rules(handover(), {"x": ["a.free", "a.go", "a.key"], "y": ["b.*"]})
+    owned = owned_by_rules(handover(), rules_of_options(["x=a.free,a.go,a.key", "y=b.*"]))
     assert owned.place("x.go_fault").owner == "x"
     assert owned.signal("x.go_overdue").owner == "x"
     assert owned.place("x.go").within == TimeLimit(1000, "x.go_overdue")
 
 
 def test_a_controller_cannot_time_the_command_of_another_one() -> None:
-    rules = {"x": ["a.free", "a.go", "a.go_fault", "a.key", "a.there"], "y": ["b.*", "a.go_overdue"]}
+    rules = rules_of_options(["x=a.free,a.go,a.go_fault,a.key,a.there", "y=b.*,a.go_overdue"])
     with pytest.raises(InputError) as caught:
         split(owned_by_rules(handover(), rules))
     assert [problem.code for problem in caught.value.diagnostics] == ["F4001"]
