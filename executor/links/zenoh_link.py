@@ -113,11 +113,12 @@ class ZenohLink:
     @property
     def question(self) -> str:
         """What there is to ask, of a host that was never reached: why, Zenoh keeps to itself."""
+        does = [("listens at", self.listen), ("joins", self.join)]
+        here = " and ".join(f"{what} {' '.join(map(printable, at))}" for what, at in does if at)
+        asked = f"{QUESTION} (this one {here})"
         if self.certificates is None:
-            return QUESTION
-        return (
-            f"{QUESTION} is the certificate of each of the authority that the other names with --tls, and not expired?"
-        )
+            return asked
+        return f"{asked} is the certificate of each of the authority that the other names with --tls, and not expired?"
 
     async def run(self, listener: LinkListener) -> None:
         """Serve until cancelled; raises `InputError` F5021 where an address cannot be listened at."""

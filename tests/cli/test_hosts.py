@@ -315,12 +315,12 @@ def test_a_host_that_is_started_again_without_its_journal_or_with_an_older_copy_
 def test_an_operator_stops_the_machines_of_one_host_although_its_coordinator_never_came(
     bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    token = str(tmp_path / "token")
+    token, at = str(tmp_path / "token"), f"tcp/127.0.0.1:{free_port()}"
     arguments = [
         "--controller",
         "robot",
         "--join",
-        f"tcp/127.0.0.1:{free_port()}",
+        at,
         "--dry-run",
         "0",
         "--format",
@@ -337,7 +337,8 @@ def test_an_operator_stops_the_machines_of_one_host_although_its_coordinator_nev
         assert process.stderr is not None
         with heard_in_time(process):  # on a busy machine it tells first that it did not run for a while
             told = next(found for line in process.stderr if (found := re.search(r"http://\S+", line)))
-            assert any("never-met: the coordinator was never reached" in line for line in process.stderr)
+            never = next(line for line in process.stderr if "never-met: the coordinator was never reached" in line)
+            assert f"(this one joins {at})" in never
         assert main(["operate", told.group(), "situation", "--token-file", token]) == 0
         assert "G2 is ready here, and is decided by the coordinator" in capsys.readouterr().out
         assert main(["operate", told.group(), "emergency-stop", "--token-file", token]) == 0
