@@ -87,8 +87,8 @@ class Operated(Protocol):
         """End the latch after an emergency stop; what is against it."""
         ...
 
-    def say(self, place: str, answer: Answer) -> bool:
-        """Say what became of a command; whether anybody asks after it."""
+    def say(self, place: str, answer: Answer) -> tuple[str, ...]:
+        """Say what became of a command; why that does not count, where nobody asks after it."""
         ...
 
     def commanded(self, command: str, by: str) -> None:
@@ -287,8 +287,7 @@ def application(
         place, word = request.query.get("place", ""), request.query.get("answer", "")
         command = f"say {place}={word}"
         run.commanded(command, who(request))
-        is_asked = word in _SAID and run.say(place, Answer(word))
-        refused = [] if is_asked else [f"nobody asks after {place}" if word in _SAID else f"say {', '.join(_SAID)}"]
+        refused = run.say(place, Answer(word)) if word in _SAID else (f"say {', '.join(_SAID)}",)
         return answered(request, command, refused)
 
     who_may = admission(endpoint, () if page is None else page.public, strangers)

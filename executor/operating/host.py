@@ -269,8 +269,8 @@ class Host:
         """End the latch after an emergency stop: the machines are asked, nothing moves. Returns what is against it."""
         return latch.reset(self)
 
-    def say(self, place: str, answer: Answer) -> bool:
-        """Say what became of a command that no machine can tell of; False where nobody asks after it."""
+    def say(self, place: str, answer: Answer) -> tuple[str, ...]:
+        """Say what became of a command that no machine can tell of; why that does not count, where it does not."""
         return restart.say(self, place, answer)
 
     def commanded(self, command: str, by: str) -> None:

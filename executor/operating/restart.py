@@ -95,18 +95,19 @@ def tell_unasked(run: Host, asked: Collection[str]) -> None:
             run.told(UNASKED, f"nobody asked after {place}: what is said of it changes nothing")
 
 
-def say(run: Host, place: str, answer: Answer) -> bool:
-    """Take the operator's word on a command of which no machine can tell; False where nobody asks after it (yet)."""
-    found = run.taking_up
-    if found is None or place not in asked_of_the_operator(run):
-        return False
+def say(run: Host, place: str, answer: Answer) -> tuple[str, ...]:
+    """Take the operator's word on a command of which no machine can tell; why not, where nobody asks after it (yet)."""
+    found, asked_after = run.taking_up, asked_of_the_operator(run)
+    if found is None or place not in asked_after:
+        others = f"; to be said is what became of {', '.join(asked_after)}" if asked_after else ""
+        return (f"nobody asks after {place}{others}",)
     found.answers[place] = answer
     for name, controller in run.controllers.items():
         for asked, entry in controller.commands.questions:
             if asked == place:
                 run.note("said", place=place, answer=answer.value)
                 run.answer(name, place, entry, answer)
-    return True
+    return ()
 
 
 def release(run: Host) -> None:

@@ -121,7 +121,8 @@ def test_an_operator_resets_an_emergency_stop_says_what_a_machine_did_and_resume
     places = re.findall(r"say (\S+)=done", told)
     assert places
     assert operate(address, "resume", folder, capsys, code=1).startswith("refused: the run is held")
-    assert "nobody asks after mc.fix" in operate(address, "say mc.fix=done", folder, capsys, code=1)
+    said = operate(address, "say mc.fix=done", folder, capsys, code=1)
+    assert f"nobody asks after mc.fix; to be said is what became of {places[0]}" in said
     for place in places:
         operate(address, f"say {place}=not-received", folder, capsys)
     assert not operate(address, "resume", folder, capsys).startswith("held")

@@ -65,9 +65,9 @@ class Told:
         self.log.append("reset")
         return ("D: 'button' is not closed",)
 
-    def say(self, place: str, answer: Answer) -> bool:
+    def say(self, place: str, answer: Answer) -> tuple[str, ...]:
         self.log.append(f"say {place} {answer.name}")
-        return place == "robot.grasp"
+        return () if place == "robot.grasp" else (f"nobody asks after {place}",)
 
     def commanded(self, command: str, by: str) -> None:
         self.log.append(f"{by}: {command}")

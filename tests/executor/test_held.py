@@ -83,7 +83,7 @@ def test_an_operator_of_a_held_run_is_heard_while_a_device_is_away_that_nobody_a
         run.served = True
         ending = asyncio.create_task(run.main())
         await asyncio.sleep(2)
-        assert run.say("a.busy", Answer.DONE)
+        assert not run.say("a.busy", Answer.DONE)
         run.stop()
         await ending
 

@@ -53,7 +53,7 @@ async def reset(host: Host) -> None:
         assert "look at the machine" not in host.situation().message
     await until(lambda: host.taking_up is not None and host.taking_up.is_final, "the answers of the machines")
     for place in uncertain(host):
-        assert host.say(place, Answer.NOT_RECEIVED)
+        assert not host.say(place, Answer.NOT_RECEIVED)
 
 
 def test_button_latches_and_the_cell_goes_on_after_it_is_released_reset_and_resumed() -> None:

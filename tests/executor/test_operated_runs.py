@@ -147,7 +147,7 @@ async def reset_and_resume(host: Host) -> None:
     assert host.reset() == ()
     await asyncio.sleep(1.0)
     for place in uncertain(host):
-        assert host.say(place, Answer.NOT_RECEIVED)
+        assert not host.say(place, Answer.NOT_RECEIVED)
     assert host.resume()
     await asyncio.sleep(1000.0)
     host.stop()

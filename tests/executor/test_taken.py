@@ -302,7 +302,7 @@ def test_a_command_that_its_machine_had_taken_is_not_given_again_because_it_know
             assert driver.sent == []
             assert again.situation().state is State.HELD
             assert "the machine of 'a.busy' had taken its command, and knows nothing of it any more" in told
-            assert again.say("a.busy", Answer.NOT_RECEIVED)
+            assert not again.say("a.busy", Answer.NOT_RECEIVED)
             assert again.resume()
             await asyncio.sleep(1)
         assert driver.sent == ["a.busy"]
