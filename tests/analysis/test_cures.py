@@ -154,7 +154,7 @@ def test_a_cure_written_into_the_net_file_makes_the_net_that_was_checked(name: s
 @pytest.mark.seeds
 def test_cures_of_drawn_nets_are_written_as_they_were_checked() -> None:
     seen: set[type[Change]] = set()
-    for seed in seeds(60):
+    for seed in sorted({*range(60), *seeds(60)}):  # one in a hundred has a cure by a place, and of those one
         net = lively_net(random.Random(seed))
         source = Source("cell.firable.yaml", format_net(net))
         for cure in (cure for verdict in _explained(net).values() for cure in verdict.cures):
