@@ -21,6 +21,8 @@ from firable.nets.source import printable
 _ENDED: Final = "has the run ended? the address is the one that it has printed"
 _EXPIRED, _EARLY, _HOST, _ADDRESS = 10, 9, 62, 64
 """What OpenSSL calls X509_V_ERR_CERT_HAS_EXPIRED, _CERT_NOT_YET_VALID, _HOSTNAME_MISMATCH, _IP_ADDRESS_MISMATCH."""
+_UNKNOWN: Final = {2, 7, 18, 19, 20, 21, 30}
+"""X509_V_ERR_* of an issuer that is not found, or that has not signed with the key that is known."""
 
 
 def unreached(address: str, error: Exception, *, has_authority: bool, has_certificate: bool) -> InputError:
@@ -52,6 +54,8 @@ def _disbelieved(found: ssl.SSLCertVerificationError, *, has_authority: bool) ->
             return f"the certificate that it shows {when}", "renew it, or set the clock of this host"
         case code if code in {_HOST, _ADDRESS}:
             return "the certificate that it shows is for another address", "write the address that stands in it"
+        case code if code not in _UNKNOWN:
+            return f"the certificate that it shows is not believed: {found.verify_message}", "make it out anew"
         case _ if has_authority:
             return "the certificate that it shows is of another authority than --ca", "is that the run that you mean?"
         case _:

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import pytest
 from aiohttp import web
+from cryptography.x509.oid import ExtendedKeyUsageOID
 from support.certificates import Site
 
 from firable.cli.main import main
-from firable.cli.operate import Caller, ask
+from firable.cli.operate import Caller, ask, client_tls
 from firable.executor.links.zenoh_link import Certificates
 from firable.executor.operating.control import tls_context
 from firable.nets.diagnostics import InputError
@@ -56,9 +57,7 @@ def refused(
 
 
 def caller(authority: str | None = None, own: Certificates | None = None) -> Caller:
-    tls = ssl.create_default_context(cafile=authority)
-    if own is not None:
-        tls.load_cert_chain(own.certificate, own.key)
+    tls = client_tls(authority, None if own is None else (own.certificate, own.key))
     return Caller("", tls, has_authority=authority is not None, has_certificate=own is not None)
 
 
@@ -79,6 +78,8 @@ def test_certificates_that_are_not_believed_are_told_apart(tmp_path: Path) -> No
     assert refused(caller(authority), server(elsewhere)).startswith(f"{shows} is for another address; write the")
     assert refused(caller(str(other.authority)), server(good)).startswith(f"{shows} is of another authority than --ca")
     assert refused(caller(), server(good)) == f"{shows} is of no authority known here; name its authority with --ca"
+    of_a_client = site.host("of a client", purpose=ExtendedKeyUsageOID.CLIENT_AUTH)
+    assert refused(caller(authority), server(of_a_client)).startswith(f"{shows} is not believed: ")
     demanding = tls_context(good.certificate, good.key, authority)
     closed = "cannot be reached: the connection is closed without an answer; "
     assert refused(caller(authority), demanding).startswith(f"{closed}the run may ask for a certificate")

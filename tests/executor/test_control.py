@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import datetime
 import re
 import ssl
 from collections.abc import Awaitable, Callable
@@ -13,14 +12,12 @@ from pathlib import Path
 import pytest
 from aiohttp import ClientConnectorError, ClientSession
 from aiohttp.client_exceptions import ClientError
-from cryptography import x509
-from cryptography.hazmat.primitives import hashes, serialization
-from cryptography.hazmat.primitives.asymmetric import ec
-from cryptography.x509.oid import NameOID
 from support.certificates import Site
 
+from firable.cli.operate import client_tls
 from firable.cli.run import run
 from firable.executor.drivers.bench import PATIENCE_S, until
+from firable.executor.links.zenoh_link import Certificates
 from firable.executor.operating.control import STRANGERS_MAX, Endpoint, new_token, serving, tls_context
 from firable.executor.operating.service import unhandled
 from firable.executor.operating.situation import Situation, State
@@ -319,61 +316,23 @@ def test_an_address_that_is_taken_is_one_clear_error() -> None:
     assert caught.value.diagnostics[0].code == "F5061"
 
 
-def pem(folder: Path, name: str, signer: tuple[x509.Name, ec.EllipticCurvePrivateKey] | None = None) -> tuple[str, str]:
-    """A certificate and its key as files: signed by itself, or by another."""
-    key = ec.generate_private_key(ec.SECP256R1())
-    subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
-    issuer, issuer_key = (subject, key) if signer is None else signer
-    now = datetime.datetime.now(datetime.UTC)
-    certificate = (
-        x509.CertificateBuilder()
-        .subject_name(subject)
-        .issuer_name(issuer)
-        .public_key(key.public_key())
-        .serial_number(x509.random_serial_number())
-        .not_valid_before(now - datetime.timedelta(days=1))
-        .not_valid_after(now + datetime.timedelta(days=1))
-        .add_extension(x509.BasicConstraints(ca=signer is None, path_length=None), critical=True)
-        .add_extension(x509.SubjectAlternativeName([x509.DNSName("localhost")]), critical=False)
-        .sign(issuer_key, hashes.SHA256())
-    )
-    at, key_at = folder / f"{name}.pem", folder / f"{name}.key"
-    at.write_bytes(certificate.public_bytes(serialization.Encoding.PEM))
-    key_at.write_bytes(
-        key.private_bytes(serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption())
-    )
-    return str(at), str(key_at)
-
-
 def test_a_certificate_of_the_authority_names_the_operator_and_no_other_gets_in(tmp_path: Path) -> None:
-    authority, authority_key = pem(tmp_path, "authority")
-    signer = (
-        x509.load_pem_x509_certificate(Path(authority).read_bytes()).subject,
-        serialization.load_pem_private_key(Path(authority_key).read_bytes(), None),
-    )
-    assert isinstance(signer[1], ec.EllipticCurvePrivateKey)
-    server, anna, stranger = (
-        pem(tmp_path, "server", (signer[0], signer[1])),
-        pem(tmp_path, "anna", (signer[0], signer[1])),
-        pem(tmp_path, "stranger"),
-    )
+    site = Site(tmp_path / "site")
+    server, anna = site.host("server"), site.host("anna")
+    stranger = Site(tmp_path / "elsewhere").host("stranger")
 
-    def client(certificate: tuple[str, str] | None) -> ssl.SSLContext:
-        context = ssl.create_default_context(cafile=authority)
-        context.check_hostname = False
-        if certificate is not None:
-            context.load_cert_chain(*certificate)
-        return context
+    def client(own: Certificates | None) -> ssl.SSLContext:
+        return client_tls(str(site.authority), None if own is None else (own.certificate, own.key))
 
     async def ask(session: ClientSession, url: str) -> None:
         async with session.post(f"{url}/pause", ssl=client(anna)) as answer:
             assert answer.status == 200
-        for certificate in (stranger, None):
+        for own in (stranger, None):
             with pytest.raises((ClientError, ConnectionError, ssl.SSLError)):
-                async with session.post(f"{url}/resume", ssl=client(certificate), headers=BEARER) as answer:
+                async with session.post(f"{url}/resume", ssl=client(own), headers=BEARER) as answer:
                     await answer.read()
 
-    tls = tls_context(*server, authority)
+    tls = tls_context(server.certificate, server.key, server.authority)
     assert with_endpoint(Endpoint("127.0.0.1", 0, TOKEN, tls), ask, tls) == ["anna: pause", "pause"]
 
 

@@ -11,7 +11,6 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from firable.executor.links.zenoh_link import Certificates
 
 HERE = "127.0.0.1"
-Signer = tuple[x509.Name, ec.EllipticCurvePrivateKey]
 
 
 class Site:
@@ -26,12 +25,19 @@ class Site:
         signed = self._certificate(self.name, self.key, is_authority=True, valid_days=valid_days)
         self.authority.write_bytes(signed.public_bytes(serialization.Encoding.PEM))
 
-    def host(self, name: str, *, valid_days: tuple[float, float] = (-0.1, 1.0), address: str = HERE) -> Certificates:
-        """The files of a host at an address, which are valid between two days from now."""
+    def host(
+        self,
+        name: str,
+        *,
+        valid_days: tuple[float, float] = (-0.1, 1.0),
+        address: str = HERE,
+        purpose: x509.ObjectIdentifier | None = None,
+    ) -> Certificates:
+        """The files of a host at an address, which are valid between two days from now, and for one purpose or any."""
         key = ec.generate_private_key(ec.SECP256R1())
         subject = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, name)])
         certificate, secret = self.folder / f"{name}.pem", self.folder / f"{name}.key"
-        signed = self._certificate(subject, key, is_authority=False, valid_days=valid_days, at=address)
+        signed = self._certificate(subject, key, is_authority=False, valid_days=valid_days, at=address, purpose=purpose)
         certificate.write_bytes(signed.public_bytes(serialization.Encoding.PEM))
         secret.write_bytes(
             key.private_bytes(
@@ -48,10 +54,11 @@ class Site:
         is_authority: bool,
         valid_days: tuple[float, float] = (-0.1, 1.0),
         at: str = HERE,
+        purpose: x509.ObjectIdentifier | None = None,
     ) -> x509.Certificate:
         now = datetime.datetime.now(datetime.UTC)
         begins, ends = (now + datetime.timedelta(days=days) for days in valid_days)
-        return (
+        draft = (
             x509.CertificateBuilder()
             .subject_name(subject)
             .issuer_name(self.name)
@@ -61,5 +68,7 @@ class Site:
             .not_valid_after(ends)
             .add_extension(x509.BasicConstraints(ca=is_authority, path_length=None), critical=True)
             .add_extension(x509.SubjectAlternativeName([x509.IPAddress(ipaddress.ip_address(at))]), critical=False)
-            .sign(self.key, hashes.SHA256())
         )
+        if purpose is not None:
+            draft = draft.add_extension(x509.ExtendedKeyUsage([purpose]), critical=False)
+        return draft.sign(self.key, hashes.SHA256())
