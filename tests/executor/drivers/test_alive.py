@@ -191,11 +191,11 @@ def test_the_safe_outputs_of_a_stop_come_once_more_when_the_device_is_seen_to_be
         await w.gone()
         await until(lambda: w.device.kept.is_connected, "another connection")
         w.driver.stop()
-        await asyncio.sleep(0.1)
+        await asyncio.sleep(0.08)  # and then goes on between two heartbeats
         assert w.driver.unconfirmed == ("D",)
         w.written.clear()
         w.lives()
-        await asyncio.sleep(0.1)
+        await asyncio.sleep(0.01)
         assert w.written == ["output"]
 
     assert watched(test).driver.unconfirmed == ()

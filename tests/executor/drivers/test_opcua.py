@@ -109,12 +109,15 @@ class TestOpcUa(DriverConformance):
 
 
 def test_a_server_that_takes_a_connection_and_says_nothing_has_not_answered_in_time() -> None:
+    async def silent(_reader: asyncio.StreamReader, _writer: asyncio.StreamWriter) -> None:
+        await asyncio.sleep(PATIENCE_S)  # with the writer, which would close the connection when it is gone
+
     async def main() -> None:
-        silent = await asyncio.start_server(lambda *_: asyncio.sleep(60), "127.0.0.1", 0)
-        options = OpcUaOptions(url=f"opc.tcp://127.0.0.1:{silent.sockets[0].getsockname()[1]}/")
+        server = await asyncio.start_server(silent, "127.0.0.1", 0)
+        options = OpcUaOptions(url=f"opc.tcp://127.0.0.1:{server.sockets[0].getsockname()[1]}/")
         with pytest.raises(TimeoutError):  # which is told as that by whoever keeps the connection
             await KIND.connect(options, Wanted((POINTS["sensor"],), 0.2))
-        silent.close()
+        server.close()
 
     asyncio.run(main())
 

@@ -377,8 +377,11 @@ def test_value_that_cannot_be_written_fails_for_who_waits_and_the_line_goes_on()
 
 
 def test_question_that_is_not_answered_in_time_fails() -> None:
+    async def silent(_reader: asyncio.StreamReader, _writer: asyncio.StreamWriter) -> None:
+        await asyncio.sleep(PATIENCE_S)  # with the writer, which would close the connection when it is gone
+
     async def main() -> None:
-        server = await asyncio.start_server(lambda *_: asyncio.sleep(PATIENCE_S), "127.0.0.1", 0)
+        server = await asyncio.start_server(silent, "127.0.0.1", 0)
         options = modbus.TcpOptions(host="127.0.0.1", port=server.sockets[0].getsockname()[1], every_s=0)
         connection = await modbus.TCP.connect(options, Wanted(read=("input 0",), timeout_s=0.05))
         for asked in (connection.read, partial(connection.write, GO)):
