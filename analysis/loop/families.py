@@ -11,7 +11,7 @@ moves any more, neither cell nor machines.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
@@ -34,6 +34,7 @@ T = TypeVar("T")
 
 ENDED: Final = Or((Holds(ACCIDENT), Holds(OVERRUN)))
 """The run has ended in an accident."""
+_MORE: Final = "give it a larger budget of markings, memory or time"
 
 
 @dataclass(frozen=True)
@@ -130,6 +131,23 @@ class Answered:
         verdicts = tuple(verdict for verdict in self.report.verdicts if verdict.name in names)
         return evidence_of_report(replace(self.report, verdicts=verdicts), (), limits)
 
+    def of(self, family: Family) -> dict[str, Verdict]:
+        """The verdicts on the properties of a family, by what each is about."""
+        found = {verdict.name.removeprefix("property."): verdict for verdict in self.report.verdicts}
+        return {of: found[prop.name] for of, prop in family.of.items()}
+
+    def doubting(self, some: Collection[str], why: str = "") -> Answered:
+        """The same, where a violation for some of what is asked about leaves a question unknown, and `why`."""
+
+        def joined(family: Family) -> Verdict:
+            found = self.of(family)
+            for of, verdict in found.items():
+                if of in some and verdict.status is Status.VIOLATED:
+                    found[of] = replace(verdict, status=Status.UNKNOWN, bound=why, witness=None, code="", hint=_MORE)
+            return _joined(self.loop, family, found)
+
+        return replace(self, verdicts=tuple(map(joined, self.families)))
+
 
 def answers(
     loop: ClosedLoop,
@@ -142,9 +160,7 @@ def answers(
     families = tuple(families)
     properties = tuple(prop for family in families for prop in family.of.values())
     report = check(replace(loop.net, properties=properties), budget=budget, progress=progress)
-    found = {verdict.name.removeprefix("property."): verdict for verdict in report.verdicts}
-    joined = (_joined(loop, family, {of: found[p.name] for of, p in family.of.items()}) for family in families)
-    return Answered(loop, families, tuple(joined), report)
+    return Answered(loop, families, (), report).doubting(())
 
 
 def _joined(loop: ClosedLoop, family: Family, found: Mapping[str, Verdict]) -> Verdict:

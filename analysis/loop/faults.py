@@ -14,11 +14,12 @@ takes, nor of a machine that forgets its command: that is another plant, in whic
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Final
 
 from firable.analysis.loop.families import Answered, Family, answers, fires, never, possible
-from firable.analysis.loop.verdicts import LoopReport, live_in
+from firable.analysis.loop.verdicts import LoopReport, known_live, live_in
 from firable.analysis.question import listed
 from firable.analysis.spaces.reachability import Budget
 from firable.nets.formula import Formula, Holds, Not, Or
@@ -27,6 +28,8 @@ from firable.nets.machines.loop import ACCIDENT, OVERRUN, ClosedLoop, Faults
 from firable.nets.machines.plant_file import PlantModel
 from firable.nets.net import Property
 from firable.nets.verdict import Status, Verdict, Weight
+
+_IN_DOUBT: Final = "it cannot fire again then, and is not known to be live without faults"
 
 
 @dataclass(frozen=True)
@@ -55,10 +58,10 @@ class FaultsAsked:
     def verdicts(self) -> Iterator[Verdict]:
         """The verdicts as they are told: what stands still after a fault, and what hangs, in one."""
         if self.for_good is not None:
-            safe, *pairs = self.for_good.verdicts
+            (_, safe), *pairs = zip(self.for_good.families, self.for_good.verdicts, strict=True)
             yield safe
-            for still, hang in zip(pairs[::2], pairs[1::2], strict=True):
-                yield _consequence(still, hang, self.live)
+            for (family, still), (_, hang) in zip(pairs[::2], pairs[1::2], strict=True):
+                yield _consequence(still, hang, self.for_good.of(family))
         if self.repaired is not None:
             yield from self.repaired.verdicts
 
@@ -88,10 +91,12 @@ def ask_faults(
     for_good, repaired = close(net, model, Faults.FOR_GOOD), close(net, model, Faults.REPAIRED)
     # Of a cell in which nothing is live, a fault takes nothing, and repair cannot give it back.
     recoveries = [_recovery(repaired, machine, live) for machine in repaired.failed] if live else []
+    lasting = answers(for_good, _for_good(for_good, live), budget, progress=progress) if for_good.failed else None
+    mended = answers(repaired, recoveries, budget, progress=progress) if recoveries else None
+    # Of what only may be live, nobody knows whether it is the fault that it cannot fire again.
+    doubted = set(live).difference(known_live(asked))
     return FaultsAsked(
-        live,
-        answers(for_good, _for_good(for_good, live), budget, progress=progress) if for_good.failed else None,
-        answers(repaired, recoveries, budget, progress=progress) if recoveries else None,
+        live, lasting and lasting.doubting(doubted, _IN_DOUBT), mended and mended.doubting(doubted, _IN_DOUBT)
     )
 
 
@@ -123,14 +128,18 @@ def _goes_on(name: str, failed: str, formula: Formula) -> Property:
     return possible(name, Or((Not(Holds(failed)), formula)))
 
 
-def _consequence(still: Verdict, hang: Verdict, live: tuple[str, ...]) -> Verdict:
-    """What stands still and what hangs after one fault, as one verdict."""
+def _consequence(still: Verdict, hang: Verdict, found: Mapping[str, Verdict]) -> Verdict:
+    """What stands still and what hangs after one fault, as one verdict; `found` is that of each transition."""
     if still.status is not Status.VIOLATED:
         return still
-    rest = [name for name in live if name not in still.subjects]
-    goes_on = f"these go on whatever fails at it: {listed(rest, 40)}" if rest else "in the end all stand still"
-    held = f"; these can hold their token for ever: {listed(hang.subjects, 40)}" if hang.subjects else ""
-    return replace(still, hint=f"{goes_on}{held}")
+    rest = [name for name, verdict in found.items() if verdict.holds]
+    open_ = [name for name, verdict in found.items() if not verdict.holds and name not in still.subjects]
+    told = [f"these go on whatever fails at it: {listed(rest, 40)}"] if rest else []
+    told += [f"it is not known of these: {listed(open_, 40)}"] if open_ else []
+    told = told or ["in the end all stand still"]
+    if hang.status is Status.VIOLATED:
+        told.append(f"these can hold their token for ever: {listed(hang.subjects, 40)}")
+    return replace(still, hint="; ".join(told))
 
 
 def _recovery(loop: ClosedLoop, machine: str, live: tuple[str, ...]) -> Family:

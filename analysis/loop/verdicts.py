@@ -149,6 +149,12 @@ def live_in(asked: Answered) -> tuple[str, ...]:
     return without(asked, verdict.subjects if verdict.status is Status.VIOLATED else ())
 
 
+def known_live(asked: Answered) -> tuple[str, ...]:
+    """The transitions of the cell that are known to be live."""
+    family = next(family for family in asked.families if family.name == LIVE)
+    return tuple(name for name, verdict in asked.of(family).items() if verdict.holds)
+
+
 def without(asked: Answered, lost: Iterable[str]) -> tuple[str, ...]:
     """The transitions of the cell but for some."""
     some = set(lost)

@@ -12,8 +12,8 @@ from support.bench_cell import COMMANDS, JUDGED, PLANT, bench, free_cell
 from support.examples import seeds
 
 from firable.analysis.check import check
-from firable.analysis.loop.faults import check_faults
-from firable.analysis.loop.verdicts import LoopReport, check_loop
+from firable.analysis.loop.faults import ask_faults, check_faults
+from firable.analysis.loop.verdicts import LoopReport, ask_loop, check_loop, known_live, live_in
 from firable.analysis.spaces.reachability import Budget, explore
 from firable.nets.catalogue import catalogue_net, catalogue_path, catalogue_plant
 from firable.nets.formula import Deadlock, parse_formula
@@ -426,6 +426,58 @@ def test_what_fails_for_good_is_not_said_to_be_repaired() -> None:
     names = faults_of(catalogue_net("one_robot"), plant_with("may_fail: repairable", "may_fail: for_good")).keys()
     assert {name for name in names if name.endswith(".repaired")} == set()
     assert "fault.R" in names
+
+
+STARTING = """\
+firable: 1
+cell: starting
+controllers:
+  c:
+    start: [cold, a]
+    inputs: [entry, hand]
+    places:
+      cold:
+      warm:
+      a:
+      clamp: {send: {machine: R, command: MOVE, to: TABLE}, until: at_table}
+transitions:
+  boot: {from: c.cold, to: c.warm}
+  t: {from: c.a, to: c.clamp}
+  t2: {from: c.clamp, to: c.a}
+"""
+
+
+def test_a_fault_is_not_to_blame_for_what_nobody_knows_to_be_live_without_it() -> None:
+    net = parse_net(STARTING)
+    known = ask_loop(net, bench())
+    assert known_live(known) == live_in(known) == ("t", "t2")
+    told = {verdict.name: verdict for verdict in ask_faults(known, bench()).verdicts()}
+    assert (told["fault.R.repaired"].holds, told["fault.R"].subjects) == (True, ("t", "t2"))
+
+    ended = ask_loop(net, bench(), Budget(markings=1, seconds=0.0))
+    assert (known_live(ended), live_in(ended)) == ((), ("boot", "t", "t2"))
+    told = {verdict.name: verdict for verdict in ask_faults(ended, bench()).verdicts()}
+    for name, about in (("fault.R.repaired", ("boot",)), ("fault.R", ("boot", "t", "t2"))):
+        assert (told[name].status, told[name].subjects, told[name].witness) == (Status.UNKNOWN, about, None)
+        assert told[name].bound == "it cannot fire again then, and is not known to be live without faults"
+
+
+def test_of_a_fault_it_is_told_what_is_not_known_of_it() -> None:
+    asked = ask_faults(ask_loop(parse_net(STARTING), bench()), bench())
+    lasting = asked.for_good
+    assert lasting is not None
+
+    def hint_without(*names: str) -> str:
+        """What is told of the fault where these properties are not decided."""
+        undecided = {f"property.fault.R.{name}" for name in names}
+        left = (replace(v, status=Status.UNKNOWN) if v.name in undecided else v for v in lasting.report.verdicts)
+        answered = replace(lasting, report=replace(lasting.report, verdicts=tuple(left))).doubting(())
+        return next(one.hint for one in replace(asked, for_good=answered).verdicts() if one.name == "fault.R")
+
+    still, hang = "in the end all stand still", "these can hold their token for ever"
+    assert hint_without() == f"{still}; {hang}: c.warm, c.clamp"
+    assert hint_without("t1", "p1") == f"it is not known of these: t2; {hang}: c.clamp"
+    assert hint_without("p0", "p1", "p2", "p3") == still
 
 
 # --- Any net
