@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from support.evidence_examples import EXAMPLES, LOOP, RACING
 
-from firable.analysis._engine import BudgetExceeded
+from firable.analysis._engine import BudgetExceeded, IncompleteGraph
 from firable.analysis.check import check
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence import claim_records
@@ -39,8 +39,9 @@ from firable.analysis.evidence.read_off import eager_cycle
 from firable.analysis.evidence.refusal import TimeIsOverError
 from firable.analysis.goal import Limits
 from firable.analysis.induction.smt import Term
-from firable.analysis.spaces.reachability import ReachabilityGraph, explore
+from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
 from firable.analysis.spaces.symbolic import explore_symbolically
+from firable.nets.catalogue import catalogue_net
 from firable.nets.catalogue.families import family_net
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import And, Holds
@@ -331,13 +332,32 @@ def test_evidence_is_made_of_a_diagram_where_the_explicit_engine_has_no_room_for
     assert [checked.record.name for checked in check_document(found) if not checked.shown] == sorted(lacking)
 
 
-def test_what_asks_a_space_out_of_time_beside_its_claims_is_lacking(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_evidence_that_memory_does_not_suffice_for_says_so() -> None:
+    """Neither is the time over, nor are there too many markings of a net of eighty, of which the memory holds none."""
+    report = check(catalogue_net("one_robot"), budget=Budget(markings=5))
+    assert report.verdict("property.accepted_is_carried_out").holds
+    found = evidence_of_report(report, limits=Limits(memory_bytes=1))
+    lacking = {record.name: record.lacking for record in found.records}
+    assert lacking["property.accepted_is_carried_out"] == "the memory for evidence was used up"
+
+
+@pytest.mark.parametrize(
+    ("error", "why"),
+    [
+        (BudgetExceeded("max_seconds is over"), "the time for evidence was over"),
+        (BudgetExceeded("max_memory_bytes is used up"), "the memory for evidence was used up"),
+        (IncompleteGraph("the exploration ended early: memory"), "the memory for evidence was used up"),
+    ],
+)
+def test_what_asks_a_space_out_of_its_budget_beside_its_claims_is_lacking(
+    monkeypatch: pytest.MonkeyPatch, error: Exception, why: str
+) -> None:
     def late(*_: object) -> None:
-        raise BudgetExceeded
+        raise error
 
     monkeypatch.setattr(Certifier, "run_in_order", late)
     commands = {"p0": Command("m", "run"), "p1": Command("m", "stop")}
     places = tuple(Place(p, marked=p == "p0", command=of) for p, of in commands.items())
     net = Net("turns", places, (Transition("go", ("p0",), ("p1",)), Transition("back", ("p1",), ("p0",))))
     lacking = {record.name: record.lacking for record in evidence_of_report(check(net)).records if record.lacking}
-    assert lacking == {"machine-never-stopped": "the time for evidence was over"}
+    assert lacking == {"machine-never-stopped": why}

@@ -28,7 +28,7 @@ from firable.analysis.evidence.certificate import (
 from firable.analysis.evidence.checking.theorems import check_premises
 from firable.analysis.evidence.claims import NEVER_FALSE, Claim, ClaimKind, as_ctl, tidy, without_start
 from firable.analysis.evidence.producing.labels import TooLargeError, drawn, labelling
-from firable.analysis.evidence.producing.lacking import NO_TIME, LackingError
+from firable.analysis.evidence.producing.lacking import LackingError, which_ended
 from firable.analysis.evidence.producing.nevers import Nevers
 from firable.analysis.evidence.producing.ranks import progress
 from firable.analysis.evidence.producing.runs import (
@@ -86,8 +86,8 @@ class Certifier:
         """
         try:
             found = self._certificate(claim, witness)
-        except (BudgetExceeded, IncompleteGraph):
-            raise LackingError(NO_TIME) from None
+        except (BudgetExceeded, IncompleteGraph) as error:
+            raise LackingError(which_ended(error)) from None
         except TooLargeError as error:
             raise LackingError(str(error)) from None
         if found is None:
@@ -111,7 +111,9 @@ class Certifier:
                 return self._unfolded(claim)
             case ClaimKind.LEADS_TO:
                 if self.spaces.wide is None or self.spaces.wide_markings is None:
-                    raise LackingError(f"ranks for a response are written for up to {WIDE_MAX:,} markings")
+                    raise LackingError(
+                        self.spaces.ended or f"ranks for a response are written for up to {WIDE_MAX:,} markings"
+                    )
                 return progress(self.spaces.wide, self.spaces.wide_markings, claim)
             case ClaimKind.ORDERED:
                 return None if self.spaces.markings is None else Labelling(self.spaces.markings)
@@ -134,7 +136,7 @@ class Certifier:
             except (TooLargeError, BudgetExceeded):
                 pass  # all markings, which a graph finds faster, may be few enough
         if self.spaces.wide_markings is None:
-            raise LackingError(f"a tableau is unfolded on up to {WIDE_MAX:,} markings")
+            raise LackingError(self.spaces.ended or f"a tableau is unfolded on up to {WIDE_MAX:,} markings")
         return Unfolded(self.spaces.wide_markings)
 
     def asked_for(self, formula: Temporal) -> Unfolded:
@@ -143,8 +145,10 @@ class Certifier:
             raise LackingError("what fires is not spoken of in steps")
         try:
             found = unfolded_markings(self.net, formula, WIDE_MAX, self.spaces.part(0.3))
-        except (TooLargeError, BudgetExceeded):
-            raise LackingError(NO_TIME) from None
+        except TooLargeError as error:
+            raise LackingError(str(error)) from None
+        except BudgetExceeded as error:
+            raise LackingError(which_ended(error)) from None
         if found is None:
             raise LackingError("some run refutes the formula")
         return Unfolded(found)
@@ -258,8 +262,8 @@ class Certifier:
             return theorem_on(self.net, self.nevers.contact_excluded, self.spaces.part(0.5))
         except LackingError as error:
             return str(error)
-        except (BudgetExceeded, IncompleteGraph):
-            return NO_TIME
+        except (BudgetExceeded, IncompleteGraph) as error:
+            return which_ended(error)
 
     def runs_firing(self, names: Iterable[str], home: Marking | None = None) -> list[FiringSequence]:
         """Runs that fire all these transitions, each as many as it can; after they met a home marking, if it is given.
@@ -279,7 +283,7 @@ class Certifier:
                 places = tuple(replace(place, marked=bool(home >> p & 1)) for p, place in enumerate(net.places))
                 net = replace(net, places=places, properties=())
             if self.discipline is Discipline.STEP:
-                raise LackingError(f"there are more than {MARKINGS_MAX:,} markings")
+                raise LackingError(self.spaces.ended or f"there are more than {MARKINGS_MAX:,} markings")
             found, left = runs_by_search(
                 net, tuple(names), Limits(self.spaces.part_of_a_run(), self.limits.memory_bytes)
             )
@@ -287,8 +291,8 @@ class Certifier:
             return [FiringSequence((*prefix, *run)) for run in found]
         except NotFoundError as error:
             raise LackingError(str(error)) from None
-        except (BudgetExceeded, IncompleteGraph):
-            raise LackingError(NO_TIME) from None
+        except (BudgetExceeded, IncompleteGraph) as error:
+            raise LackingError(which_ended(error)) from None
 
     def _run_firing(self, name: str, home: Marking | None) -> tuple[tuple[str, ...], ...]:
         """A run from M0 that fires a transition which no search met, from whichever space there is."""
@@ -325,8 +329,8 @@ class Certifier:
             elif home == self.net.initial_marking:
                 way = self.spaces.way(lambda space: space.satisfying(goal))
                 found = None if way is None else FiringSequence(way.firings)
-        except (BudgetExceeded, IncompleteGraph):
-            raise LackingError(NO_TIME) from None
+        except (BudgetExceeded, IncompleteGraph) as error:
+            raise LackingError(which_ended(error)) from None
         if found is None:
             raise LackingError("no run was found from the home marking to the goal")
         return found
@@ -353,13 +357,13 @@ class Certifier:
     def parted(self) -> Formula | None:
         """Something that holds for ever from one marking and never again from another: why there is no home marking.
 
-        Raises `LackingError` where the time does not suffice.
+        Raises `LackingError` where time or memory do not suffice.
         """
         try:
             space = self.spaces.asked
             return None if space is None else parting(space)
-        except (BudgetExceeded, IncompleteGraph):
-            raise LackingError(NO_TIME) from None
+        except (BudgetExceeded, IncompleteGraph) as error:
+            raise LackingError(which_ended(error)) from None
 
 
 def _alone(diagram: Diagram) -> Diagram:

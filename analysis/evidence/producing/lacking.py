@@ -6,10 +6,34 @@ import re
 from typing import Final
 
 NO_TIME: Final = "the time for evidence was over"
+NO_MEMORY: Final = "the memory for evidence was used up"
 
 
 class LackingError(Exception):
     """No certificate was found, and why."""
+
+
+def which_ended(error: Exception) -> str:
+    """Which budget for evidence ended, of an error that says that one did.
+
+    >>> which_ended(RuntimeError("max_memory_bytes is used up"))
+    'the memory for evidence was used up'
+    """
+    return NO_MEMORY if "memory" in str(error) else NO_TIME
+
+
+def is_of_budget(reason: str) -> bool:
+    """Whether a reason is a budget that ended, of which more may move it.
+
+    >>> is_of_budget(NO_TIME), is_of_budget(f"a vote: {NO_MEMORY}"), is_of_budget("some run refutes the formula")
+    (True, True, False)
+    """
+    return reason.endswith((NO_TIME, NO_MEMORY))
+
+
+def what_to_allow(reason: str) -> str:
+    """More of what a reason says that it ended, as a hint."""
+    return "more memory, with --max-memory" if reason.endswith(NO_MEMORY) else "more time, with --max-seconds"
 
 
 def is_of_size(reason: str) -> bool:

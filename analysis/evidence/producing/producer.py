@@ -34,7 +34,7 @@ from firable.analysis.evidence.meaning import (
     tokens_at_least,
 )
 from firable.analysis.evidence.producing.claims import Certifier
-from firable.analysis.evidence.producing.lacking import NO_TIME, LackingError
+from firable.analysis.evidence.producing.lacking import NO_TIME, LackingError, which_ended
 from firable.analysis.evidence.producing.room import Room
 from firable.analysis.evidence.read_off import eager_cycle, read_off
 from firable.analysis.evidence.refusal import TimeIsOverError
@@ -98,8 +98,8 @@ class _Verdicts:
                 shown = list(self._shown(verdict, query, proved))
             except LackingError as error:
                 lacking = str(error)
-            except (BudgetExceeded, IncompleteGraph):
-                lacking = NO_TIME  # of what was looked for beside the claims themselves
+            except (BudgetExceeded, IncompleteGraph) as error:
+                lacking = which_ended(error)  # of what was looked for beside the claims themselves
         once = {order_of(claim): (claim, certificate) for claim, certificate in reversed(shown)}
         shown = [once[key] for key in sorted(once)]  # of what is shown twice, the first
         if not self._room.take([certificate for _, certificate in shown]):

@@ -17,6 +17,7 @@ from firable.analysis.evidence.claim_records import steps_of
 from firable.analysis.evidence.claims import is_marking
 from firable.analysis.evidence.producing.distances import Distances
 from firable.analysis.evidence.producing.labels import TooLargeError, drawn, listed
+from firable.analysis.evidence.producing.lacking import NO_MEMORY, NO_TIME
 from firable.analysis.goal import Limits
 from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
 from firable.analysis.spaces.space import StateSpace
@@ -44,6 +45,8 @@ class Spaces:
 
     def __init__(self, net: Net, discipline: Discipline, limits: Limits, given: StateSpace[Any] | None = None) -> None:
         self.net, self.discipline, self.limits, self.given = net, discipline, limits, given
+        self.ended = ""
+        """Which budget ended the last exploring, in words; empty where it was for the number of markings."""
 
     def part(self, share: float) -> Deadline:
         """A part of the time that is left for evidence."""
@@ -86,7 +89,9 @@ class Spaces:
             try:
                 graph = explore(self.net, self.discipline, budget, deadline=self.part(0.2))
             except InputError:  # there is no room for the net itself, and a diagram may need less
+                self.ended = NO_MEMORY
                 return None
+            self.ended = {"memory": NO_MEMORY, "time": NO_TIME}.get(graph.engine.reason or "", "")
         return graph.until(self.limits.deadline) if graph.complete and graph.n_markings <= most else None
 
     @cached_property
