@@ -16,7 +16,7 @@ from dataclasses import replace
 from typing import Final
 
 from firable.analysis.deadline import NEVER, Deadline
-from firable.analysis.evidence.producing.lacking import NO_TIME, is_of_size
+from firable.analysis.evidence.producing.lacking import NO_TIME, is_of_budget, is_of_size, what_to_allow
 from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.goal import Limits
 from firable.analysis.report import CheckReport
@@ -46,10 +46,11 @@ METHOD: Final = "shown by its evidence"
 """How each verdict on the net was found, as a bundle says it: what it tells besides is for `firable check` to say."""
 _LESS: Final = "that is a limit of size, which no time moves: make it smaller, or ask for less by the property"
 _MORE: Final = f"allow more time to look for evidence, with --max-seconds; without it, that is {SECONDS:g} s"
+_BUDGET: Final = "F3004"
 
 
 class UnbundledError(InputError):
-    """Why a bundle may not be made (F4003), with the verdicts that were to be in it."""
+    """Why a bundle may not be made (F4003, or F3004 for a budget that ended), with the verdicts meant for it."""
 
     def __init__(self, diagnostics: Iterable[Diagnostic], verdicts: tuple[Verdict, ...]) -> None:
         super().__init__(diagnostics)
@@ -77,7 +78,7 @@ def make_bundle(
 
     Raises `InputError`: F4001 and F2011 where the net cannot be split; F4003 where the report is not that of exploring
     this net by interleaving, which is how it will be executed, and where the net is not made of its origin. For all
-    that must be proved and is not, or is not shown, it is an `UnbundledError` (F4003).
+    that must be proved and is not, or is not shown, it is an `UnbundledError` (F4003; F3004 where a budget ended).
     """
     if report.net != report.space.net:
         message = f"the verdicts are on another net than '{report.net.name}'"
@@ -158,7 +159,8 @@ def _given_up(proof: ProofReport) -> Iterator[Diagnostic]:
     for verdict in proof.verdicts:
         if verdict.weight is Weight.INFORMATION and not verdict.holds:
             message = f"'{verdict.name}' is {verdict.status.value}, not proved: {verdict.statement}"
-            yield Diagnostic("F5002", message, verdict.hint, ("verdicts", verdict.name))
+            code = _BUDGET if verdict.status is Status.UNKNOWN else "F5002"
+            yield Diagnostic(code, message, verdict.hint, ("verdicts", verdict.name))
 
 
 def seen_by(verdict: Verdict, net: str = "NET", plant: str = "PLANT") -> str:
@@ -174,8 +176,12 @@ def _unbundled(problem: Diagnostic, lacking: Mapping[str, str], loops: Mapping[s
     name = problem.subject[-1]
     if name in lacking:
         message = f"'{name}' is proved, and there is no evidence that shows it again: {lacking[name]}"
-        return replace(problem, code="F4003", message=message, hint=_LESS if is_of_size(lacking[name]) else _MORE)
+        hint, code = _LESS if is_of_size(lacking[name]) else _MORE, "F4003"
+        if is_of_budget(lacking[name]):
+            code = _BUDGET
+            hint = _MORE if lacking[name].endswith(NO_TIME) else f"allow {what_to_allow(lacking[name])}"
+        return replace(problem, code=code, message=message, hint=hint)
     if name in loops:
         hint = "; ".join(filter(None, (problem.hint, seen_by(loops[name]))))
         return replace(problem, code="F4003", hint=hint)
-    return replace(problem, code="F4003")
+    return problem if problem.code == _BUDGET else replace(problem, code="F4003")

@@ -15,6 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from firable.analysis.check import check
+from firable.analysis.evidence.producing.lacking import is_of_budget, what_to_allow
 from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.goal import Limits
 from firable.analysis.spaces.reachability import Budget
@@ -68,7 +69,8 @@ def sealed(
     """The verdicts on a refinement and the files of a bundle that show them; `timeout_ms` is for each obligation.
 
     Raises `InputError` F4003 where the detailed net is another one than the tasks make, where the
-    conceptual net is not known to be contact-free, and where there is no evidence on something that the rest needs.
+    conceptual net is not known to be contact-free, and where there is no evidence on something that the rest needs; for
+    what a budget leaves open it is F3004.
     """
     conceptual = origin.conceptual
     try:
@@ -102,17 +104,18 @@ def sealed(
     if shown.get(("", "contact-free")) is not Status.PROVED:
         hint = "`firable check` of the conceptual net shows where; a task that violates its conditions is told before"
         message = f"'{conceptual.name}' is not known to be contact-free, and nothing is carried over from it"
-        raise InputError([Diagnostic("F4003", message, hint)])
+        code = "F4003" if ("", "contact-free") in shown else "F3004"  # undecided, it has no record
+        raise InputError([Diagnostic(code, message, hint)])
     for (about, name), why in lacking.items():
         where = f"of the task '{about}'" if about else f"of '{conceptual.name}'"
         message = f"'{name}' {where} is decided, and there is no evidence that shows it again: {why}"
-        hint = "allow more time to look for it, with --max-seconds"
-        raise InputError([Diagnostic("F4003", message, hint)])
+        code = "F3004" if is_of_budget(why) else "F4003"
+        raise InputError([Diagnostic(code, message, f"allow {what_to_allow(why)}, to look for it")])
     said = by_z3(text, timeout_ms)
     for (name, _), answer in zip(stated.relation.obligations, said[1::2], strict=True):
         if gave_up(answer):
             message = f"'{name}' of the refinement is not decided in {timeout_ms / 1000:g} s"
-            raise InputError([Diagnostic("F4003", message, "allow more time, or make the tasks smaller")])
+            raise InputError([Diagnostic("F3004", message, "allow more time, or make the tasks smaller")])
         if answer != "unsat":
             raise RuntimeError(f"'{name}' follows from the theorem of refinement, and z3 says {answer}")
     return tuple(stated.verdicts(shown)), files

@@ -209,7 +209,7 @@ def test_no_bundle_is_made_where_an_obligation_on_a_vote_was_given_up(monkeypatc
     monkeypatch.setattr(
         Reader, "answer", lambda self, text: Answer.UNKNOWN if '(echo "unit.1")' in text else answer(self, text)
     )
-    with pytest.raises(InputError, match=r"F4003.*'unit.1' is unknown, not proved"):
+    with pytest.raises(InputError, match=r"F3004.*'unit.1' is unknown, not proved"):
         make_bundle(check(BY_A_UNIT))
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations, product
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,10 +16,12 @@ from support.second_solver import by_cvc5
 
 from firable.analysis.check import check
 from firable.analysis.evidence.document import Document
+from firable.analysis.evidence.producing.lacking import NO_MEMORY, NO_TIME
 from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.goal import Limits
 from firable.analysis.induction.smt import Answer, Decision, Operator, Terms, value
 from firable.analysis.report import CheckReport
+from firable.cli.main import main
 from firable.decompose.bundling import make_bundle
 from firable.decompose.proofs.arbitration import Competition, Steps, arbitration, choice
 from firable.decompose.proofs.families import FAMILIES
@@ -519,20 +522,34 @@ def test_protocol_proof_says_of_a_split_what_it_says_where_all_that_it_assumes_i
     assert protocol_lines(decomposition, o2) == [("by the protocol proof", "protocol")] * 2
 
 
-def test_net_is_not_bundled_where_no_evidence_on_it_was_found(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("why", "code", "hint"),
+    [
+        ("nothing shows it", "F4003", "allow more time to look for evidence, with --max-seconds"),
+        (NO_TIME, "F3004", "allow more time to look for evidence, with --max-seconds"),
+        (NO_MEMORY, "F3004", "allow more memory, with --max-memory"),
+        ("ranks are written for up to 250,000 markings", "F4003", "that is a limit of size, which no time moves"),
+    ],
+)
+def test_net_is_not_bundled_where_no_evidence_on_it_was_found(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, why: str, code: str, hint: str
+) -> None:
     def without(report: CheckReport, queries: Sequence[Query], limits: Limits) -> Document:
         document = evidence_of_report(report, queries, limits)
         lacking = {"deadlock-free", "live"}  # of which the one is required
-        records = (replace(r, shown=(), lacking="no time") if r.name in lacking else r for r in document.records)
+        records = (replace(r, shown=(), lacking=why) if r.name in lacking else r for r in document.records)
         return replace(document, records=tuple(records))
 
     monkeypatch.setattr("firable.decompose.bundling.evidence_of_report", without)
     with pytest.raises(InputError) as refusal:
         make_bundle(check(catalogue_net("one_robot")))
     (one,) = refusal.value.diagnostics
-    assert (one.code, one.subject) == ("F4003", ("verdicts", "deadlock-free"))
-    assert one.message == "'deadlock-free' is proved, and there is no evidence that shows it again: no time"
-    assert "--max-seconds" in one.hint
+    assert (one.code, one.subject) == (code, ("verdicts", "deadlock-free"))
+    assert one.message == f"'deadlock-free' is proved, and there is no evidence that shows it again: {why}"
+    assert one.hint.startswith(hint)
+    made = tmp_path / "cell.bundle"
+    assert main(["bundle", "catalogue:one_robot", "-o", str(made)]) == (3 if code == "F3004" else 2)
+    assert not made.exists()
 
 
 def test_deadlocking_net_is_not_bundled_with_the_verdicts_on_a_good_one() -> None:
