@@ -16,6 +16,7 @@ from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.checking.checker import check_document
 from firable.analysis.evidence.document import document_from_text
 from firable.analysis.goal import Limits
+from firable.analysis.spaces.symbolic import SymbolicSpace
 from firable.decompose.bundling import make_bundle
 from firable.decompose.splitting import persistence as module
 from firable.decompose.splitting import walking
@@ -94,6 +95,15 @@ def agree(decomposition: Decomposition, found: Persistence) -> None:
         assert verdict.subjects == by
 
 
+def agree_as_far_as_is_told(decomposition: Decomposition, found: Persistence) -> None:
+    """Each vote is decided, as all markings show it; of what takes it back some is named."""
+    for part, by in falsified(decomposition).items():
+        verdict = found.of(part)
+        assert verdict.status is (Status.VIOLATED if by else Status.PROVED)
+        assert bool(verdict.subjects) is bool(by)
+        assert set(verdict.subjects) <= set(by)
+
+
 @given(owned_nets())
 @examples(30)
 def test_persistent_are_the_parts_whose_yes_no_firing_of_another_takes_back(net: Net) -> None:
@@ -122,10 +132,7 @@ def test_a_race_of_techniques_finds_the_same_where_no_space_is_held(net: Net) ->
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module._Deciding, "_held", lambda _: None)
         found = persistence(decomposition)
-    for part, by in falsified(decomposition).items():
-        verdict = found.of(part)
-        assert verdict.status is (Status.VIOLATED if by else Status.PROVED)
-        assert set(verdict.subjects) <= set(by)
+    agree_as_far_as_is_told(decomposition, found)
     assert all(one.shown for one in check_document(found.evidence()))
 
 
@@ -441,8 +448,23 @@ def test_a_sensor_that_may_drop_excludes_nothing_and_a_completion_that_stays_doe
     agree(decomposition, found)
 
 
-def test_votes_of_a_net_that_the_explicit_engine_has_no_room_for_are_settled_or_unknown() -> None:
+def test_votes_of_a_net_that_the_explicit_engine_has_no_room_for_are_decided_all_the_same() -> None:
     decomposition = split(catalogue_net("one_robot_mc_late"))
-    whole = {verdict.name: verdict.status for verdict in persistence(decomposition).verdicts}
-    for verdict in persistence(decomposition, limits=Limits(memory_bytes=1)).verdicts:
-        assert verdict.status in {whole[verdict.name], Status.UNKNOWN}
+    found = persistence(decomposition, limits=Limits(memory_bytes=1))
+    assert found.space is None
+    assert any(falsified(decomposition).values()), "arcs and units do not settle all"
+    agree_as_far_as_is_told(decomposition, found)
+
+
+def test_votes_are_decided_by_a_diagram_where_a_table_does_not_hold_all_markings(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def never_raced(*_: object) -> None:
+        raise AssertionError("the diagram leaves nothing to a race")
+
+    monkeypatch.setattr(module, "FIRST_MARKINGS", 10)
+    monkeypatch.setattr(module._Deciding, "_race", never_raced)
+    decomposition = split(catalogue_net("one_robot_mc_late"))
+    found = persistence(decomposition)
+    assert isinstance(found.space, SymbolicSpace)
+    agree(decomposition, found)
