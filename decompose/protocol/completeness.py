@@ -32,6 +32,7 @@ from firable.decompose.protocol.building import ProtocolNet
 from firable.decompose.protocol.draft import ASTRAY, at, central
 from firable.decompose.protocol.faulty import GO_ON
 from firable.decompose.protocol.parts import Part
+from firable.nets.diagnostics import InputError
 from firable.nets.formula import And, Holds, Not, Or
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import Witness
@@ -50,7 +51,10 @@ class Lost(NamedTuple):
 
 def central_markings(net: Net, limits: Limits) -> Mapping[Marking, tuple[int, ...]]:
     """The reachable markings of the central net, and what may fire in each; `IncompleteGraph` for too many."""
-    graph = explore(net, budget=Budget(CENTRAL_MARKINGS_MAX, limits.memory_bytes), deadline=limits.deadline)
+    try:
+        graph = explore(net, budget=Budget(CENTRAL_MARKINGS_MAX, limits.memory_bytes), deadline=limits.deadline)
+    except InputError as error:  # there is no room for the net itself
+        raise IncompleteGraph(error.diagnostics[0].message) from None
     graph.require_complete()
     return {
         graph.marking(i): tuple(t for fired, _ in graph.successors(i) for t in fired) for i in range(graph.n_markings)

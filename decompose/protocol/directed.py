@@ -32,6 +32,7 @@ from firable.decompose.protocol.building import ProtocolNet
 from firable.decompose.protocol.draft import CHANNELS, at, down, late
 from firable.decompose.protocol.parts import Part
 from firable.decompose.protocol.rounds import asked, committed
+from firable.nets.diagnostics import InputError
 from firable.nets.formula import Formula
 from firable.nets.net import Net, Transition
 from firable.nets.verdict import Witness
@@ -134,7 +135,10 @@ class Search:
         places = self.protocol.net.places
         net = Net("focus", places, (*steps, *(leap.transition for leap in leaps.values())))
         budget = Budget(MARKINGS_MAX, self.limits.memory_bytes)
-        graph = explore(net, budget=budget, deadline=self.limits.deadline).until(NEVER)
+        try:
+            graph = explore(net, budget=budget, deadline=self.limits.deadline).until(NEVER)
+        except InputError:  # there is no room for the net itself
+            return None
         found = graph.witness(graph.satisfying(self.goal))
         if found is None:
             return None

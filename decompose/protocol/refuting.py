@@ -34,9 +34,10 @@ from firable.decompose.protocol.wrong import WrongProtocol, example
 from firable.decompose.splitting.cut import split
 from firable.decompose.splitting.persistence import freed
 from firable.nets.decomposition import Decomposition
+from firable.nets.diagnostics import InputError
 from firable.nets.formula import And, Formula, Holds, Or
 from firable.nets.net import Net, Property, PropertyKind
-from firable.nets.verdict import Status, Verdict, Weight, Witness
+from firable.nets.verdict import NOTHING, Status, Verdict, Weight, Witness
 
 WALK_SECONDS_MAX: Final = 3.0
 LINES_READ: Final = 40
@@ -135,7 +136,10 @@ def refute(wrong: WrongProtocol, net: Net | Decomposition | None = None, limits:
         decomposition = freed(decomposition)
     limits = limits or Limits()
     protocol = protocol_net(decomposition, wrong.variant, wrong.faults)
-    graph = explore(protocol.net, budget=Budget(FIRST_MARKINGS, limits.memory_bytes), deadline=limits.deadline)
+    try:
+        graph = explore(protocol.net, budget=Budget(FIRST_MARKINGS, limits.memory_bytes), deadline=limits.deadline)
+    except InputError as error:  # there is no room for the net itself
+        return Refutation(wrong, protocol, Status.UNKNOWN, NOTHING, bound=error.diagnostics[0].message)
     graph = graph.until(NEVER)  # the markings that were found are looked at even if the time was over meanwhile
     witness = graph.witness(graph.satisfying(_goal(protocol)))
     if witness is not None and len(witness.firings) <= LINES_READ_AT_ONCE:

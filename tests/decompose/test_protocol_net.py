@@ -274,6 +274,13 @@ def test_diagram_that_is_too_large_asks_for_memory_and_not_for_time(monkeypatch:
     assert {(verdict.status, verdict.hint) for verdict in found.safety} == {(Status.UNKNOWN, exploring.MORE_MEMORY)}
 
 
+def test_memory_without_room_for_the_central_net_leaves_open_whether_anything_is_lost() -> None:
+    found = explore_protocol(load_net("ring"), limits=Limits(memory_bytes=1))
+    assert found.complete.status is Status.UNKNOWN
+    assert "1 bytes does not hold the net itself" in found.complete.bound
+    assert statuses(found) == {Status.PROVED, Status.UNKNOWN}, "the rest is asked of the protocol alone"
+
+
 def test_votes_that_are_no_promises_need_the_bare_skeleton() -> None:
     from firable.decompose.protocol.variant import Votes
 

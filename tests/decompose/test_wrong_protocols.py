@@ -228,6 +228,18 @@ def test_a_net_without_free_parts_cannot_go_wrong_by_them(name: str) -> None:
     assert refute(BY_NAME[name], split(net)).status is Status.PROVED
 
 
+def test_memory_without_room_for_a_protocol_leaves_it_undecided() -> None:
+    for wrong in WRONG:
+        found = refute(wrong, limits=Limits(memory_bytes=1))
+        assert found.status is Status.UNKNOWN
+        assert "1 bytes does not hold the net itself" in found.bound
+
+
+def test_a_focus_that_memory_has_no_room_for_is_left_out() -> None:
+    protocol = protocol_net(split(load_net("ring")))
+    assert directed(protocol, Holds(ASTRAY), Limits(memory_bytes=1)) is None
+
+
 def test_time_that_ends_while_the_first_markings_are_found_leaves_it_undecided(monkeypatch: pytest.MonkeyPatch) -> None:
     over = Event()
 
