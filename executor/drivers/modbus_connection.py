@@ -14,7 +14,7 @@ and two locks: a good part of what a reaction takes. Here one timer watches all 
 what is sent is sent by a plain call, so that a command that follows from an answer leaves in the turn of the event loop
 in which the answer came (`begin`). Who waits for an answer is told when the connection is gone, which pymodbus tells
 nobody. And what comes when nobody asks any more, as where a stop has broken off a question, is nobody's answer: it is
-dropped before pymodbus warns of it.
+dropped before pymodbus warns of it. An answer that pymodbus cannot read fails its question, and is no error of ours.
 """
 
 from __future__ import annotations
@@ -120,8 +120,10 @@ class ModbusConnection(Stepwise):
         self.client = client
         self.closed = partial(ModbusException, "the connection was closed")
         self.unconnected = partial(ModbusException, "Not connected")
+        self.unreadable = partial(ModbusException, "an answer that nobody can read")
+        self.decode = client.ctx.callback_data
         client.ctx.trace_connect = self._told
-        client.ctx.trace_packet = self._passed
+        setattr(client.ctx, "callback_data", self._came)  # noqa: B010 - it is a method
         self.requests = _requests()
         self.is_line = is_line
         """Whether it is the one way to the device, on which late answers come to whoever asks next."""
@@ -251,9 +253,17 @@ class ModbusConnection(Stepwise):
         if not is_connected and self.is_asking and not answer.done():
             answer.set_exception(self.closed())
 
-    def _passed(self, is_sent: bool, data: bytes) -> bytes:
-        """What goes out, and what comes in as long as somebody asks."""
-        return data if is_sent or not self.client.ctx.response_future.done() else b""
+    def _came(self, data: bytes, addr: tuple[Any, ...] | None = None) -> int:
+        """What comes goes to pymodbus as long as somebody asks; returns how much of it is over."""
+        answer = self.client.ctx.response_future
+        if answer.done():
+            return len(data)
+        try:
+            return self.decode(data, addr)
+        except Exception:  # which the event loop would tell at the terminal, as a mistake
+            if self.is_asking and not answer.done():
+                answer.set_exception(self.unreadable())
+            return len(data)
 
     async def _written(
         self, begun: tuple[_Question, asyncio.Future[ModbusPDU]] | None, questions: Iterator[_Question], withheld: int

@@ -132,6 +132,10 @@ WRITTEN = "0F 0001 0001"
         ("read", WRITTEN, "an answer to another question than that for input 0"),
         ("read", "84 02", "the device refuses input 0: exception 2 (it has no such address)"),
         ("read", "84 7F", "the device refuses input 0: exception 127"),
+        ("read", "84", "input 0: an answer that nobody can read"),
+        ("read", "04 09 0007", "input 0: an answer that nobody can read"),
+        ("read", "63 01", "input 0: an answer that nobody can read"),
+        ("coil 1", "80 01", "coil 1: an answer that nobody can read"),
         ("coil 1", WRITTEN, ""),
         ("coil 1", "0F 0002 0001", "an answer to another question than that for coil 1"),
         ("coil 1", "0F 0001 0002", "an answer to another question than that for coil 1"),
@@ -145,7 +149,11 @@ WRITTEN = "0F 0001 0001"
     ],
 )
 def test_answer_that_is_not_to_the_question_is_none(question: str, answer: str, why: str) -> None:
+    errors: list[object] = []
+
     async def main() -> None:
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: errors.append(context))
+
         async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
             asked = await reader.read(64)
             body = bytes.fromhex("01" + answer.replace(" ", ""))
@@ -164,3 +172,4 @@ def test_answer_that_is_not_to_the_question_is_none(question: str, answer: str, 
         server.close()
 
     asyncio.run(main())
+    assert not errors
