@@ -185,6 +185,16 @@ class Prompt(Withholding, Protocol):
         ...
 
 
+@runtime_checkable
+class Owed(Protocol):
+    """A connection that is the one way to its device, as a line is: a late answer comes to whoever asks next."""
+
+    @property
+    def owed_seconds(self) -> float:
+        """How long after its end an answer may still come that would be taken for one to another question."""
+        ...
+
+
 class Stepwise:
     """What a connection has that writes in steps, and waits for the confirmation of each (`Withholding`)."""
 

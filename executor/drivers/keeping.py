@@ -8,7 +8,8 @@ earlier. A connection that has failed in any way is closed and never asked again
 that doubles up to a bound, and is read before it is written, because what the device shows then decides what is still
 to be sent. The pause is short again when a connection has stood for as long as an answer or a sign of life may take: a
 device that can be read and refuses what is written to it would else be connected, and told of, ten times a second.
-After an emergency stop it is short also then, as each connection brings the safe outputs.
+After an emergency stop it is short also then, as each connection brings the safe outputs. It is as long as a line may
+still bring an answer to what was asked before (`device.Owed`), but for a stop: no answer decides anything then.
 
 A stop breaks off a command that is being written, if it is not confirmed at once, and makes new connections until the
 device has confirmed the safe outputs, or has had its time. On these, and on each connection after an emergency stop,
@@ -51,6 +52,7 @@ from firable.executor.drivers.device import (
     DeviceKind,
     LinkError,
     Options,
+    Owed,
     Point,
     Prompt,
     Value,
@@ -173,6 +175,8 @@ class Kept:
         """How many connections there have been."""
         self.stood_seconds = 0.0
         """How long the last of them has stood."""
+        self.owed_seconds = 0.0
+        """How long after its end it may still be answered."""
         self.is_connected = False
         self.started = False
         """Whether the safe outputs of the start-up have been written, to a device that is alive."""
@@ -245,7 +249,7 @@ class Kept:
         alive = self.document.alive
         enough_s = self.document.timeout_s if alive is None else min(alive.within_s, self.document.timeout_s)
         while not self.stopping:
-            self.stood_seconds = 0.0
+            self.stood_seconds = self.owed_seconds = 0.0
             try:
                 await self._connected()
             except _FAILURES as error:
@@ -253,7 +257,7 @@ class Kept:
             if self.stood_seconds >= enough_s or (self.stood_seconds and self.served.is_latched):
                 pause_s = self.document.retry_s
             with suppress(TimeoutError):
-                await asyncio.wait_for(self._asked_to_stop(), pause_s)
+                await asyncio.wait_for(self._asked_to_stop(), max(pause_s, self.owed_seconds))
             pause_s = min(2 * pause_s, self.document.retry_max_s)
 
     def stop(self) -> None:
@@ -302,6 +306,7 @@ class Kept:
                 self.stood_seconds = asyncio.get_running_loop().time() - since_seconds
             self._forget()
             await connection.close()
+            self.owed_seconds = connection.owed_seconds if isinstance(connection, Owed) else 0.0
 
     async def _serve(self, connection: Connection) -> None:
         self.has_read = False

@@ -7,6 +7,8 @@ and a command goes before the next poll.
 A request that is not answered in time ends the connection. Frames over TCP carry a transaction number and pymodbus
 looks at it, frames of RTU carry none: there a late answer would be the answer to the next question. So an answer must
 fit its question, and a line is not left before the answer has come that is still owed, or its time is over (`close`).
+An answer that could be one to another poll as well is given that time once more before the line is used again
+(`owed_seconds`): of two inputs of one device that is late, the one would be shown in the place of the other.
 
 What is asked, how it is written and read, and the transport are those of pymodbus; only the waiting is done here
 (`ModbusConnection.ask`). Its `execute` sets a timer for each request, and passes an answer on through three coroutines
@@ -135,6 +137,8 @@ class ModbusConnection(Stepwise):
         """Whether an answer is awaited: the line takes one question at a time."""
         self.is_owed = False
         """Whether the device has not answered what it was asked, also where nobody waits for it any more."""
+        self.is_polling = False
+        """Whether that is a poll, whose answer could be one to another poll."""
         self.queue: deque[asyncio.Future[None]] = deque()
         """Who waits for the line; the first is told when it is free."""
         self.is_free = asyncio.Event()
@@ -190,7 +194,13 @@ class ModbusConnection(Stepwise):
             poll = self.polls[self.polled]
             if not self._is_idle:
                 await self._turn()
-            self.shown += poll.values(await self._answer(self.ask(poll.question), poll.question))
+            asked, self.is_polling = self.ask(poll.question), True
+            answer = await self._answer(asked, poll.question)
+            try:
+                self.shown += poll.values(answer)
+            except LinkError:
+                self.is_owed = True
+                raise
             self.polled += 1
             if poll.urgent and not self.is_first and self.polled < len(self.polls):
                 layout = poll.urgent
@@ -223,6 +233,7 @@ class ModbusConnection(Stepwise):
         line = self.client.ctx
         answer: asyncio.Future[ModbusPDU] = self.loop.create_future()
         self.is_asking = self.is_owed = True
+        self.is_polling = False
         self.watch.begin(answer)
         line.response_future, line.recv_buffer = answer, b""
         try:
@@ -242,10 +253,18 @@ class ModbusConnection(Stepwise):
             if self.is_line and self.is_owed and self.client.ctx.transport is not None and left_s > 0:
                 self.client.ctx.response_future = owed = self.loop.create_future()
                 await asyncio.wait((owed,), timeout=left_s)
+                self.is_owed = not owed.done()
         finally:
             if isinstance(transport := self.client.ctx.transport, asyncio.Transport):
                 transport.abort()  # before pymodbus, which would send what it still has
             self.client.close()
+
+    @property
+    def owed_seconds(self) -> float:
+        """How long a poll may still be answered on a line: twice as long as it should be."""
+        if not (self.is_line and self.is_owed and self.is_polling):
+            return 0.0
+        return max(0.0, self.watch.since_seconds + 2 * self.watch.timeout_s - self.loop.time())
 
     def _told(self, is_connected: bool) -> None:
         """The connection is made, or it is gone: then nobody will answer what was asked."""
@@ -257,7 +276,7 @@ class ModbusConnection(Stepwise):
         """What comes goes to pymodbus as long as somebody asks; returns how much of it is over."""
         answer = self.client.ctx.response_future
         if answer.done():
-            return len(data)
+            return 0  # the next question clears it
         try:
             return self.decode(data, addr)
         except Exception:  # which the event loop would tell at the terminal, as a mistake

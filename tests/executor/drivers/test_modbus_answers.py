@@ -1,16 +1,22 @@
 """What is made of the answers of a Modbus device: each to its own question, and a contact that is open at once."""
 
 import asyncio
+import os
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 
 import pytest
 from pymodbus.constants import ExcCodes
+from pymodbus.framer import FramerRTU
 
 from firable.executor.drivers import modbus
-from firable.executor.drivers.bench import PATIENCE_S, until
+from firable.executor.drivers.bench import PATIENCE_S, Heard, until
 from firable.executor.drivers.binding import parse_binding
+from firable.executor.drivers.bound import BoundDriver
+from firable.executor.drivers.cancelling import ended
 from firable.executor.drivers.device import LinkError, Point, Value, Wanted, Writes
+from firable.executor.drivers.far_side.line import PseudoLine
 from firable.executor.drivers.far_side.modbus_server import ModbusTcpEnd
 from firable.executor.drivers.keeping import Kept, Nobody
 
@@ -173,3 +179,41 @@ def test_answer_that_is_not_to_the_question_is_none(question: str, answer: str, 
 
     asyncio.run(main())
     assert not errors
+
+
+LATE = """{firable_bind: 1, cell: c, devices: {D: {driver: modbus-rtu, port: PORT, parity: N, timeout_s: 0.4}},
+signals: {dark: {device: D, read: discrete 2, on_loss: hold}, lit: {device: D, read: discrete 7, on_loss: hold}}}"""
+
+
+def test_answer_that_a_line_brings_late_is_not_taken_for_that_to_another_poll() -> None:
+    async def main() -> None:
+        line, heard = PseudoLine(), Heard()
+        line.open()
+        late = False
+
+        async def serve() -> None:
+            nonlocal late
+            end = os.open(line.far, os.O_RDWR | os.O_NONBLOCK)
+            while True:
+                with suppress(BlockingIOError):
+                    question = os.read(end, 8)
+                    number = question[3]
+                    if late and number == 7:
+                        late = False
+                        await asyncio.sleep(0.6)
+                    answer = question[:2] + bytes([1, number == 7])
+                    os.write(end, answer + FramerRTU.compute_CRC(answer).to_bytes(2, "big"))
+                await asyncio.sleep(0.001)
+
+        driver = BoundDriver(parse_binding(LATE.replace("PORT", line.near)), (), frozenset())
+        works = [asyncio.create_task(work) for work in (serve(), driver.run(heard, heard))]
+        try:
+            await until(lambda: heard.notes == ["D: connected"], "the connection")
+            late = True
+            await until(lambda: heard.notes[-1] == "D: connected again", "the next one")
+        finally:
+            await ended(works)
+            line.close()
+        assert heard.signals == [("dark", False, None), ("lit", True, None)]
+
+    asyncio.run(main())

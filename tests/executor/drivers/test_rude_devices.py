@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import pytest
 
+from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.bench import bench_net, until
 from firable.executor.drivers.binding import SignalDocument, parse_binding
 from firable.executor.drivers.bound import bound_driver
@@ -86,6 +87,30 @@ def test_the_pause_before_a_new_connection_grows_until_one_has_stood_for_a_while
         assert sum(pauses) < sum(grown)
     else:
         assert all(pause > 0.9 * least for pause, least in zip(pauses, grown, strict=True))
+
+
+class Owing(Refusing):
+    """A device on a line, which may still answer what it was asked."""
+
+    owed_seconds = 30.0
+
+
+def test_a_line_is_not_used_again_while_it_may_still_bring_an_answer_but_for_a_stop() -> None:
+    async def main() -> tuple[float, float]:
+        device, loop = Owing(), asyncio.get_running_loop()
+        document = parse_binding(FLAPPING.replace("TIMEOUT", "10")).document.devices["D"]
+        kept = Kept(document, device, TcpOptions(host="h"), Wanted(("discrete 0",), 10.0), Nobody())
+        task = asyncio.create_task(kept.run())
+        await until(lambda: len(device.connections_at) == 2, "two connections")
+        await asyncio.sleep(1)
+        stopped_at = loop.time()
+        kept.stop()
+        await task
+        return device.connections_at[1] - device.connections_at[0], loop.time() - stopped_at
+
+    pause, stopping = run_in_virtual_time(main())
+    assert pause > 0.99 * Owing.owed_seconds
+    assert stopping < 1
 
 
 class Latched(Nobody):
