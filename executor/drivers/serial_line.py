@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import os
 import re
 from collections import deque
 from collections.abc import Sequence
@@ -137,10 +138,12 @@ class Lines:
         self.come.set()
 
     def _write(self) -> None:
-        try:
-            self.out = self.out[self.port.write(self.out) or 0 :]
-        except Exception as error:
-            self._failed(error)
+        try:  # not by pyserial, which tries for ever where nothing can be sent now
+            self.out = self.out[os.write(self.port.fileno(), self.out) :]
+        except BlockingIOError:
+            pass
+        except OSError as error:
+            self._failed(LinkError(port_reason(error)))
             return
         if self.out:
             self.loop.add_writer(self.port.fileno(), self._write)

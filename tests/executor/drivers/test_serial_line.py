@@ -1,6 +1,8 @@
 """Lines of text over a pair of pseudo-terminals."""
 
 import asyncio
+import subprocess
+import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -10,7 +12,7 @@ import pytest
 from serial import Serial
 
 from firable.executor.drivers import modbus, serial_line
-from firable.executor.drivers.bench import Far, until
+from firable.executor.drivers.bench import PATIENCE_S, Far, until
 from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.conformance import DriverConformance
 from firable.executor.drivers.device import LinkError, Wanted
@@ -66,6 +68,38 @@ def test_a_port_that_cannot_be_had_is_told_with_the_reason_in_words(kind: Any) -
         line.close()
 
     asyncio.run(main())
+
+
+@pytest.mark.parametrize("kind", [serial_line.KIND, modbus.RTU], ids=["serial", "modbus-rtu"])
+def test_a_line_that_takes_nothing_holds_nobody_up(kind: Any) -> None:
+    """In a process of its own, which can be ended where it is held up."""
+    parity = {} if kind is serial_line.KIND else {"parity": "N"}
+    point = "a" if kind is serial_line.KIND else "discrete 0"
+    program = f"""
+import asyncio, os, tty
+from contextlib import suppress
+from firable.executor.drivers import modbus, serial_line
+from firable.executor.drivers.device import Wanted
+
+async def main():
+    far, near = os.openpty()
+    tty.setraw(near)
+    os.set_blocking(near, False)
+    with suppress(BlockingIOError):
+        while True:
+            os.write(near, 1000 * b"x")
+    kind = {"serial_line.KIND" if kind is serial_line.KIND else "modbus.RTU"}
+    connection = await kind.connect(kind.options(port=os.ttyname(near), **{parity}), Wanted(({point!r},), 0.1))
+    try:
+        await connection.read()
+    except Exception as error:
+        print(type(error).__name__)
+    await connection.close()
+
+asyncio.run(main())
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=PATIENCE_S)
+    assert done.stdout.strip() in {"TimeoutError", "LinkError"}, done.stderr
 
 
 class Latched(Nobody):
