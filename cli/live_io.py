@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Mapping
 from contextlib import suppress
+from shutil import get_terminal_size
 from typing import TYPE_CHECKING
 
 import click
@@ -153,8 +154,8 @@ class _Heard:
         self.begun = time.monotonic()
         self.failed = False
         """Whether a machine has failed, or was stopped."""
-        self.lines = 0
-        """How many lines of the table stand above, to be written over."""
+        self.above: list[str] = []
+        """The lines of the table that stands above, to be written over."""
         self.by_hand: list[tuple[str, ByHand]] = []
         """What was to be forced and sent, as it was asked for."""
         self.lines_taken: dict[str, str] = {}
@@ -210,18 +211,19 @@ class _Heard:
         return bool(undone)
 
     def _told(self, line: str) -> None:
-        self.lines = 0
+        self.above = []
         click.echo(line, err=True)
 
     def show(self, driver: BoundDriver) -> None:
         """The table, over the one before where that stands on a terminal."""
         readings = driver.readings()
-        if self.lines and sys.stdout.isatty():
-            click.echo(f"\x1b[{self.lines}F\x1b[J", nl=False)
-        rows = list(self.rows(readings))
-        for row in rows:
+        if self.above and sys.stdout.isatty():
+            columns = max(1, get_terminal_size().columns)
+            broken = sum((len(click.unstyle(row)) - 1) // columns for row in self.above)  # as a narrow terminal does
+            click.echo(f"\x1b[{len(self.above) + broken}F\x1b[J", nl=False)
+        self.above = list(self.rows(readings))
+        for row in self.above:
             click.echo(row)
-        self.lines = len(rows)
 
     def rows(self, readings: Mapping[str, Reading]) -> list[str]:
         """One line for each signal."""

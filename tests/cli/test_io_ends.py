@@ -9,6 +9,7 @@ import time
 from collections.abc import Sequence
 from importlib.metadata import EntryPoint
 from pathlib import Path
+from typing import cast
 
 import pytest
 from serial import Serial
@@ -17,10 +18,13 @@ from support.asking import heard
 from support.third_party_driver import MemoryConnection, MemoryEnd, MemoryKind, MemoryOptions
 from support.waiting import PATIENCE_SECONDS
 
+from firable.cli import live_io
 from firable.cli.main import main as firable
 from firable.executor.drivers import kinds, serial_line
 from firable.executor.drivers.bench import until
+from firable.executor.drivers.bound import BoundDriver
 from firable.executor.drivers.device import InUseError, LinkError, Point, Value, Wanted, Writes
+from firable.executor.drivers.driver import Quality, Reading
 from firable.executor.drivers.far_side.serial_device import SerialEnd
 from firable.executor.drivers.sparing import Sparing
 
@@ -284,3 +288,26 @@ def test_value_that_could_not_be_written_is_an_error_also_when_io_is_asked_to_en
 
     why = "bench is not connected: /dev/nobody-is-here: No such file or directory"
     assert asyncio.run(main()) == (1, f"error: --force a.key=1 was not written: {why}")
+
+
+class Shown:
+    """A driver as the table sees it."""
+
+    def readings(self) -> dict[str, Reading]:
+        """A sensor."""
+        return {"a.key": Reading(value=True, quality=Quality.GOOD, why="")}
+
+
+@pytest.mark.parametrize(("columns", "lines"), [(80, 2), (42, 3), (20, 5)])
+def test_table_is_written_over_the_one_before_also_where_a_narrow_terminal_has_broken_its_lines(
+    columns: int, lines: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(columns))
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    table, driver = live_io._Heard(), cast("BoundDriver", Shown())
+    monkeypatch.setattr(table, "now_seconds", lambda: 0.5)
+    for _ in range(2):
+        table.show(driver)
+    drawn = capsys.readouterr().out
+    assert drawn.count("\x1b[J") == 1
+    assert f"\x1b[{lines}F\x1b[J" in drawn
