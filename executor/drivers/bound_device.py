@@ -97,6 +97,8 @@ class BoundDevice:
         """When the device should show that it has taken what was written to a channel last."""
         self.late: dict[Channel | Handshake, Order] = {}
         """What it has not shown to have taken by then, of each channel the newest."""
+        self.unseen = set(self.image.signals)
+        """The signals that this connection has not shown."""
         self.noted = ""
         self.garbage: dict[Point, str] = {}
         """What was told of the points of channels that said nothing of a command."""
@@ -252,6 +254,8 @@ class BoundDevice:
         opened = self._opened(batch)  # before anything else
         now = self.driver.clock.now_seconds() if self.driver.clock is not None else 0.0
         changes, faults = self.image.take(batch, now)
+        if self.unseen:
+            self.unseen.difference_update(*(self.image.reads.get(point, ()) for point, _ in batch))
         if not opened and not self.contacts.are_closed:
             self.contacts.read(self.image.readings)
             if self.driver.may_move:  # what was sent before that has waited for it
@@ -281,7 +285,7 @@ class BoundDevice:
 
     def ready(self) -> None:
         """A new connection has told what the device shows."""
-        if self.alarm is not None:
+        if self.alarm is not None and not (self.was_ready and self.unseen):
             self.alarm.cancel()
         self.note("connected again" if self.was_ready else "connected")
         self.noted = ""
@@ -311,11 +315,13 @@ class BoundDevice:
 
     def lost(self, why: str) -> None:
         """There is no connection, or none any more."""
+        self.unseen.update(self.image.signals)
         if self.is_ready.is_set():
             self.is_ready.clear()
             self._give_up_by_hand(why)
             if self.contacts.contacts:
                 self._emergency(self.contacts.lost(why))
+                self.image.lost(why, self.contacts.signals())
             self._alarm(self.document.grace_s, why)
         if why != self.noted and not self.driver.is_stopped:
             self.noted = why
@@ -399,8 +405,15 @@ class BoundDevice:
             self._give_up(why)
 
     def _give_up(self, why: str) -> None:
-        """The device has been lost for longer than is waited: the loss policies hold."""
-        self._tell(*self.image.lost(why))
+        """The device has been lost for longer than is waited: the loss policies hold.
+
+        Where it is connected again, they hold for what it has not shown since: a broker may have come back without it.
+        """
+        if not self.is_ready.is_set():
+            self._tell(*self.image.lost(why))
+            return
+        gone = [name for name in sorted(self.unseen) if self.image.readings[name].quality is Quality.GOOD]
+        self._tell(*self.image.lost(f"not shown since it was connected again: {why}", gone))
 
     def _tell(self, changes: Sequence[Change], faults: Sequence[str]) -> None:
         if self.driver.listener is not None and not self.driver.is_stopped:

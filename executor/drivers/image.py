@@ -11,7 +11,7 @@ Pure: the time comes with each call.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 
 from firable.executor.drivers.binding import SignalDocument
@@ -89,12 +89,17 @@ class Image:
                 self.readings[name] = replace(reading, coalesced=reading.coalesced + untold)
         return changes, faults
 
-    def lost(self, why: str) -> tuple[list[Change], list[str]]:
-        """The device is lost: follow the policy of each signal; returns what changes, and which are faults."""
-        before = {name: reading.value for name, reading in self.readings.items()}
-        faults = [fault for name in self.signals for fault in self._lose(name, why)]
-        self.counted.clear()  # the device may count anew
-        self.unreadable.clear()
+    def lost(self, why: str, signals: Collection[str] | None = None) -> tuple[list[Change], list[str]]:
+        """The device is lost, or shows some of its signals no more: follow the policy of each of them.
+
+        Returns what changes, and which are faults.
+        """
+        gone = self.signals if signals is None else signals
+        before = {name: self.readings[name].value for name in gone}
+        faults = [fault for name in gone for fault in self._lose(name, why)]
+        for name in gone:
+            self.counted.pop(name, None)  # the device may count anew
+            self.unreadable.discard(name)
         return list(self._changes(before)), faults
 
     def _changes(self, before: Mapping[str, bool | None]) -> Iterator[Change]:

@@ -7,10 +7,12 @@ from itertools import pairwise
 import pytest
 
 from firable.executor.cell.virtual_time import run_in_virtual_time
-from firable.executor.drivers.bench import bench_net, until
+from firable.executor.drivers.bench import Heard, bench_net, until
 from firable.executor.drivers.binding import SignalDocument, parse_binding
-from firable.executor.drivers.bound import bound_driver
+from firable.executor.drivers.bound import BoundDriver, bound_driver
+from firable.executor.drivers.bound_device import BoundDevice
 from firable.executor.drivers.device import LinkError, Point, Value, Wanted, Writes
+from firable.executor.drivers.driver import Quality
 from firable.executor.drivers.image import Image
 from firable.executor.drivers.keeping import Kept, Nobody
 from firable.executor.drivers.modbus import TCP, TcpOptions
@@ -166,3 +168,42 @@ def test_what_says_nothing_of_a_command_is_told_once_as_long_as_it_does_and_not_
     assert notes == [f"'done' shows {value}, which says nothing of a command" for value in shown]
     device.read((("needed", "y" * 1_000_000),))
     assert len(device.image.readings["M.needed"].why) < 200
+
+
+FORGETFUL = """{firable_bind: 1, cell: c, devices: {D: {driver: mqtt, host: h, grace_s: 3,
+alive: {read: life, within_s: 1}}},
+emergency_stop: {door: {device: D, read: door}}, signals: {held: {device: D, read: held, on_loss: hold},
+zero: {device: D, read: zero, on_loss: 0}, needed: {device: D, read: needed}, shown: {device: D, read: shown}}}"""
+
+
+def test_what_a_broker_has_forgotten_is_lost_after_the_grace_though_it_is_connected_again() -> None:
+    async def main() -> tuple[BoundDevice, Heard]:
+        driver, heard = BoundDriver(parse_binding(FORGETFUL), (), frozenset(), latched=True), Heard()
+        driver.clock = driver.listener = heard
+        device = driver.devices["D"]
+        device.read([(name, "1") for name in ("held", "zero", "needed", "shown", "door")])
+        device.ready()
+        assert not tuple(driver.against())
+        device.lost("cut")
+        await asyncio.sleep(1)
+        device.read([("shown", "1")])
+        device.ready()
+        assert tuple(driver.against()) == ("D: 'door' is not closed",)
+        assert device.image.readings["held"].quality is Quality.GOOD
+        driver.is_latched = False
+        await asyncio.sleep(3)
+        return device, heard
+
+    device, heard = run_in_virtual_time(main())
+    why = "not shown since it was connected again: cut"
+    shown = {
+        name: (one.value, one.quality, one.why) for name, one in device.image.readings.items() if name in device.told
+    }
+    assert shown == {
+        "held": (True, Quality.UNCERTAIN, why),
+        "zero": (False, Quality.BAD, why),
+        "needed": (True, Quality.BAD, why),
+        "shown": (True, Quality.GOOD, ""),
+    }
+    assert heard.faults == [f"D: 'needed' cannot be read: {why}"]
+    assert heard.signals[4:] == [("zero", False, None)]
