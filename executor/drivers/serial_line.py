@@ -73,11 +73,13 @@ def framed(text: str) -> bytes:
 def unframed(line: bytes) -> str | None:
     """What a line says, without its end; None where it is damaged.
 
-    >>> unframed(b"done=7*0A"), unframed(b"done=8*0A")
-    ('done=7', None)
+    A zero byte, as a break on the line is read, leaves the check value as it is.
+
+    >>> unframed(b"done=7*0A"), unframed(b"done=8*0A"), unframed(b"\\0done=7*0A")
+    ('done=7', None, None)
     """
     text, star, check = line.rpartition(b"*")
-    if not star or check != b"%02X" % _check(text):
+    if not star or check != b"%02X" % _check(text) or b"\0" in text:
         return None
     return text.decode("utf-8", "replace")
 

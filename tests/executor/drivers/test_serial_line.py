@@ -1,8 +1,10 @@
 """Lines of text over a pair of pseudo-terminals."""
 
 import asyncio
+import os
 import subprocess
 import sys
+import tty
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -100,6 +102,26 @@ asyncio.run(main())
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=PATIENCE_S)
     assert done.stdout.strip() in {"TimeoutError", "LinkError"}, done.stderr
+
+
+@pytest.mark.parametrize("line", [b"\0a=1*6D\n", b"a=\x001*6D\n", b"a=1\0*6D\n"])
+def test_a_zero_byte_that_the_check_value_does_not_show_is_damage(line: bytes) -> None:
+    """Else a break on the line would hide what a sensor shows, and its last value would be good."""
+
+    async def main() -> None:
+        far, near = os.openpty()
+        tty.setraw(near)
+        with Serial(os.ttyname(near), timeout=0) as port:
+            lines = serial_line.Lines(port)
+            os.write(far, b"a=1*6D\n" + line)
+            assert await asyncio.wait_for(lines.get(), PATIENCE_S) == "a=1"
+            with pytest.raises(LinkError, match="a damaged line"):
+                await asyncio.wait_for(lines.get(), PATIENCE_S)
+            lines.close()
+        os.close(far)
+        os.close(near)
+
+    asyncio.run(main())
 
 
 class Latched(Nobody):
