@@ -54,6 +54,9 @@ _NUMBER: Final = re.compile(r"^\[(code:|Errno )-?\d+\] ")
 NOT_LET_IN: Final = frozenset({134, 135})
 """How a broker says that a user's password is wrong, or that somebody may not connect."""
 
+REFUSED: Final = 0x80
+"""From here on the codes of a broker say that it does not do what it was asked for."""
+
 
 class MqttTls(BaseModel):
     """The files of TLS: the authority of the broker, and a certificate of one's own where the broker asks for one."""
@@ -114,7 +117,10 @@ class MqttConnection(Stepwise):
             # and that is an error that the event loop tells at the terminal.
             self.client._connected = asyncio.get_running_loop().create_future()
             raise
-        await self.client.subscribe([(topic, 1) for topic in (*self.wanted.read, self.own)])
+        topics = (*self.wanted.read, self.own)
+        for topic, said in zip(topics, await self.client.subscribe([(topic, 1) for topic in topics]), strict=False):
+            if (said if isinstance(said, int) else said.value) >= REFUSED:
+                raise LinkError(f"the broker does not let '{topic}' be read")
         await self.client.publish(self.own, "1", qos=1, timeout=self.wanted.timeout_s)
 
     async def read(self) -> Sequence[tuple[Point, Value]]:
@@ -166,6 +172,8 @@ class MqttConnection(Stepwise):
                 with suppress(MqttError):  # when it has seen that
                     while await anext(self.client.messages):
                         pass
+            if (gone := self.client._disconnected).done() and not gone.cancelled():
+                gone.exception()  # nobody else asks, where it was gone before anything was read
 
 
 def _unless_closed(

@@ -1,6 +1,7 @@
 """MQTT through mosquitto, which is started for each test."""
 
 import asyncio
+import gc
 import os
 import socket
 import time
@@ -67,6 +68,38 @@ def test_a_connection_that_is_given_up_before_a_frozen_broker_has_answered_leave
             await asyncio.wait_for(connecting, 0.2)
         end.faults.silent = False
         await end.stop()
+        return left
+
+    assert asyncio.run(main()) == []
+
+
+@pytest.mark.parametrize(
+    ("answer", "why"),
+    [(b"", "Operation timed out"), (b"\x90\x04\x00\x01\x80\x01", "the broker does not let 'cell/key' be read")],
+    ids=["ends", "refuses"],
+)
+def test_a_broker_that_does_not_let_a_topic_be_read_is_told_and_leaves_no_error_to_the_event_loop(
+    answer: bytes, why: str
+) -> None:
+    async def main() -> list[object]:
+        left: list[object] = []
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: left.append(context))
+
+        async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            await reader.read(1000)
+            writer.write(b"\x20\x02\x00\x00")
+            await reader.read(1000)
+            writer.write(answer)
+            if answer:
+                await reader.read(1000)
+            writer.close()
+
+        server = await asyncio.start_server(serve, "127.0.0.1", 0)
+        options = MqttOptions(host="127.0.0.1", port=server.sockets[0].getsockname()[1])
+        with pytest.raises(LinkError, match=why):
+            await KIND.connect(options, Wanted(("cell/key",), timeout_s=0.7))
+        server.close()
+        gc.collect()
         return left
 
     assert asyncio.run(main()) == []
