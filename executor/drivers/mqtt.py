@@ -118,8 +118,9 @@ class MqttConnection(Stepwise):
             self.client._connected = asyncio.get_running_loop().create_future()
             raise
         topics = (*self.wanted.read, self.own)
-        for topic, said in zip(topics, await self.client.subscribe([(topic, 1) for topic in topics]), strict=False):
-            if (said if isinstance(said, int) else said.value) >= REFUSED:
+        said: Sequence[Any] = await self.client.subscribe([(topic, 1) for topic in topics])
+        for topic, code in zip(topics, said, strict=False):
+            if getattr(code, "value", code) >= REFUSED:
                 raise LinkError(f"the broker does not let '{topic}' be read")
         await self.client.publish(self.own, "1", qos=1, timeout=self.wanted.timeout_s)
 
