@@ -123,9 +123,10 @@ class ModbusConnection(Stepwise):
         self.closed = partial(ModbusException, "the connection was closed")
         self.unconnected = partial(ModbusException, "Not connected")
         self.unreadable = partial(ModbusException, "an answer that nobody can read")
-        self.decode = client.ctx.callback_data
-        client.ctx.trace_connect = self._told
-        setattr(client.ctx, "callback_data", self._came)  # noqa: B010 - it is a method
+        line: Any = client.ctx  # of which a method is replaced
+        self.decode: Callable[..., int] = line.callback_data
+        line.callback_data = self._came
+        line.trace_connect = self._told
         self.requests = _requests()
         self.is_line = is_line
         """Whether it is the one way to the device, on which late answers come to whoever asks next."""
