@@ -21,7 +21,8 @@ heard later things of this very journal, it ends whoever was met: its places are
 them by the safe outputs of its start, in the middle of their work. So one that nobody has ever let in leaves them alone
 until somebody does or `MEET_SECONDS` are over; where another host has said that it has them, until it is let in, or the
 other was gone for `PARTED_SECONDS`; where a third one has let the other in, until it is let in itself, or a person has
-stopped it and started it again. All that is in the situation as long as it lasts.
+stopped it and started it again; where a coordinator of them is of another bundle or version, as long as that one is
+there, for it tells nobody unlike it whom it has let in. All that is in the situation as long as it lasts.
 A host that comes back with its journal drives the safe outputs at once, and so does an emergency stop.
 Rejected: to leave them alone until somebody lets it in, however long. A cell is started from its machines at rest, and
 the first host of it may wait for hours for the others.
@@ -166,6 +167,16 @@ class Peers:
         theirs = set(self.rival_let_in_by).union(*self.refused_hosts)
         return tuple(sorted(theirs.intersection(self.acts.controllers)))
 
+    @property
+    def _unlike(self) -> set[str]:
+        """The coordinators of machines here that are there, and of another bundle or version."""
+        return set() if COORDINATOR in self.acts.coordinators else self.deciding & self.of_other_release
+
+    @property
+    def _may_be_claimed(self) -> bool:
+        """Whether another host has machines here, or may have been let in with them by one that would not say so."""
+        return bool(self.claimed or self._unlike)
+
     async def let_drive(self, is_urgent: Callable[[], bool]) -> None:
         """Wait as long as another host may have the machines here, or is said to have them; not where it is urgent.
 
@@ -175,10 +186,14 @@ class Peers:
         self.hands_off_until_seconds = max(self.hands_off_until_seconds, loop.time() + MEET_SECONDS)
         self.is_hands_off = True
         try:
-            while self.is_unmet and not is_urgent() and (self.claimed or loop.time() < self.hands_off_until_seconds):
+            while (
+                self.is_unmet
+                and not is_urgent()
+                and ((is_open := self._may_be_claimed) or loop.time() < self.hands_off_until_seconds)
+            ):
                 self.meeting.clear()
                 with suppress(TimeoutError):
-                    async with asyncio.timeout_at(None if self.claimed else self.hands_off_until_seconds):
+                    async with asyncio.timeout_at(None if is_open else self.hands_off_until_seconds):
                         await self.meeting.wait()
         except asyncio.CancelledError:
             own = asyncio.current_task()
@@ -246,6 +261,12 @@ class Peers:
         elif self.left_by_rival:
             why = f"the host that had {all_called(sorted(self.left_by_rival))} is gone, or a line to it is broken"
             until = f", or that has been gone for {PARTED_SECONDS:g} s"
+        elif unlike := sorted(self._unlike):
+            by = all_called(unlike)
+            why, until = (
+                f"{by} may have let another host in with {all_called(self.acts.controllers)}",
+                f", or {by} is gone",
+            )
         else:
             why = f"another host may have {all_called(self.acts.controllers)}"
             until = f", or nobody says so within {MEET_SECONDS:g} s of its start"

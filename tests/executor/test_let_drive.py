@@ -49,8 +49,8 @@ class Cell:
         if point == "n":
             self.end.show("t", value)
 
-    def start(self, machines: tuple[str, ...], journal: Journal | None = None) -> Host:
-        host = self.hosts.host(machines, journal or MemoryJournal())
+    def start(self, machines: tuple[str, ...], journal: Journal | None = None, digest: str = "d") -> Host:
+        host = self.hosts.host(machines, journal or MemoryJournal(), digest)
         if machines == A:
             host.driver = bound_driver(parse_binding(BINDING), SPLIT.net, SPLIT.subnet("a"))
             host.tell = lambda _, sentence: self.told.append(sentence)
@@ -82,6 +82,45 @@ def test_a_host_beside_the_one_that_has_its_machines_writes_them_nothing(monkeyp
         assert (await refusal(cell.tasks[-1])).code == "F5025"  # the coordinator knows another journal
         assert mistaken.peers.claimed == ("a",)
         assert cell.written == []
+        await cell.end_all()
+
+    asyncio.run(main())
+
+
+def test_a_host_whose_coordinator_has_another_bundle_writes_nothing_for_that_may_have_let_another_host_in(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(peers, "MEET_SECONDS", 0.3)
+
+    async def main() -> None:
+        cell = Cell(monkeypatch)
+        await cell.begin()
+        cell.start(CENTRE)
+        mistaken = cell.start(A, digest="of the release before")
+        await until(lambda: mistaken.peers.of_other_release, "the coordinator's refusal")
+        assert left_alone(mistaken) == [
+            f"the coordinator may have let another host in with 'a': {ALONE}, or the coordinator is gone"
+        ]
+        assert (await refusal(cell.tasks[-1])).code == "F5020"
+        assert cell.written == []
+        await cell.end_all()
+
+    asyncio.run(main())
+
+
+def test_a_host_drives_its_machines_when_a_coordinator_of_another_bundle_is_gone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def main() -> None:
+        cell = Cell(monkeypatch)
+        await cell.begin()
+        cell.start(CENTRE)
+        alone = cell.start(A, digest="of the release before")
+        await until(lambda: alone.peers.of_other_release, "the coordinator's refusal")
+        cell.tasks[0].cancel()
+        await until(lambda: cell.written, "the safe outputs of its start")
+        assert set(cell.written) == {"out"}
+        assert not cell.tasks[-1].done()
         await cell.end_all()
 
     asyncio.run(main())
