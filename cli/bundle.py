@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from firable.cli import text
-from firable.cli.files import READ, WRITTEN
+from firable.cli.files import READ, WRITTEN_BUNDLE
 from firable.cli.loop import machines_option, read_fitting
 from firable.cli.options import (
     analysis_options,
@@ -37,7 +37,7 @@ _UNMADE: Final = "F4003"
 
 @click.command(short_help="Check and prove a net, and seal it in a bundle that may run.")
 @net_argument
-@click.option("-o", "--output", metavar="FILE", type=WRITTEN, required=True, help="The bundle to write.")
+@click.option("-o", "--output", metavar="FILE", type=WRITTEN_BUNDLE, required=True, help="The bundle to write.")
 @machines_option
 @click.option("--faults", is_flag=True, help="The same under lost and doubled messages, crashes and restarts.")
 @click.option("--protocol", is_flag=True, help="Hold the proof on the voting protocol of this very net, too.")

@@ -33,8 +33,14 @@ OTHER_FILES: Final = {
     ".bind.yaml": "a binding",
     ".tasks.yaml": "a file of tasks",
     ".layout.yaml": "a layout file",
+    ".signatures": "a file of signatures",
+    ".key": "a secret key",
+    ".pub": "a public key",
+    ".pem": "a certificate or a key",
 }
-"""What else people write, by the suffix of its name."""
+"""What else people keep, by the suffix of its name."""
+BUNDLES: Final = {".bundle": "a bundle"}
+"""What `firable bundle` alone writes."""
 FOLDERS_MAX: Final = 20_000
 """So many folders are searched for net files, in about a second: more than projects have, and less than disks."""
 _INSTALLED: Final = frozenset({"node_modules"})  # virtual environments are known by what is in them
@@ -201,9 +207,12 @@ READ: Final = FileType(_read, is_written=False)
 """A file that is read, or `catalogue:NAME`."""
 NETS: Final = FileType(_read_below, is_written=False)
 """Such a file, or a folder, which stands for the net files below it."""
-WRITTEN: Final = FileType(_written, is_written=True, never=OTHER_FILES | dict.fromkeys(NET_FILES, "a net file"))
+_NO_NET: Final = OTHER_FILES | dict.fromkeys(NET_FILES, "a net file")
+WRITTEN: Final = FileType(_written, is_written=True, never=_NO_NET | BUNDLES)
 """A file that is written, over what stands there; - is standard output."""
-WRITTEN_NET: Final = FileType(_written, is_written=True, never=OTHER_FILES)
+WRITTEN_BUNDLE: Final = FileType(_written, is_written=True, never=_NO_NET)
+"""A bundle that is written, over what stands there."""
+WRITTEN_NET: Final = FileType(_written, is_written=True, never=OTHER_FILES | BUNDLES)
 """A net that is written, over what stands there."""
 FOLDER: Final = FileType(_later, is_written=True)
 """A folder that files are written into, whose names are known later."""

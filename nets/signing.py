@@ -71,6 +71,8 @@ def make_key(path: str | Path) -> str:
     public = key.public_key().public_bytes(serialization.Encoding.PEM, serialization.PublicFormat.SubjectPublicKeyInfo)
     try:
         for file in (path, public_path):
+            if file.is_dir():
+                raise _refusal("F1017", file, "this is a directory", "name a file in it")
             if file.exists():
                 raise _refusal("F1017", file, "a file stands there, and may be a key in use", "name another file")
         descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)

@@ -224,6 +224,8 @@ class SqliteJournal:
                 machines = all_called(map(str, json.loads(machines)))
             message = f"{path}: the journal is of {printable(machines)}, and not of {all_called(self.machines)}"
         hint = "name another journal, or run the bundle that the journal belongs to"
+        if its_format == FORMAT and its_digest != digest:
+            hint += "; `firable takeover` lets a new bundle go on where that one has stopped"
         raise InputError([Diagnostic("F5031", message, hint)])
 
 

@@ -10,7 +10,18 @@ from pathlib import Path
 import click
 import pytest
 
-from firable.cli.files import FOLDER, JOURNAL, MADE, NETS, OLD_JOURNAL, READ, WRITTEN, WRITTEN_NET, FileType
+from firable.cli.files import (
+    FOLDER,
+    JOURNAL,
+    MADE,
+    NETS,
+    OLD_JOURNAL,
+    READ,
+    WRITTEN,
+    WRITTEN_BUNDLE,
+    WRITTEN_NET,
+    FileType,
+)
 from firable.cli.main import COMMANDS, firable, main
 from firable.nets.catalogue import catalogue_path
 
@@ -74,9 +85,11 @@ def named_as(kind: FileType) -> set[tuple[str, str]]:
 def pairs() -> Iterator[tuple[str, str, str]]:
     """Each command with an output and with what it reads or writes besides; twice the same where it is repeatable."""
     for name, command in commands():
-        written = [one for one in command.params if {WRITTEN, WRITTEN_NET, JOURNAL} & {*types_of(one)}]
+        written = [one for one in command.params if {WRITTEN, WRITTEN_BUNDLE, WRITTEN_NET, JOURNAL} & {*types_of(one)}]
         files = [
-            one for one in command.params if {WRITTEN, WRITTEN_NET, JOURNAL, READ, NETS, OLD_JOURNAL} & {*types_of(one)}
+            one
+            for one in command.params
+            if {WRITTEN, WRITTEN_BUNDLE, WRITTEN_NET, JOURNAL, READ, NETS, OLD_JOURNAL} & {*types_of(one)}
         ]
         for output in written:
             for other in files:
@@ -145,9 +158,21 @@ def test_no_output_is_written_over_another_file_of_the_command(
 
 
 @pytest.mark.parametrize(
-    "name", ["cell.firable.yaml", "cell.firable.yml", "Cell.plant.yaml", "cell.bind.yaml", "cell.layout.yaml"]
+    "name",
+    [
+        "cell.firable.yaml",
+        "cell.firable.yml",
+        "Cell.plant.yaml",
+        "cell.bind.yaml",
+        "cell.layout.yaml",
+        "cell.bundle",
+        "cell.bundle.signatures",
+        "release.key",
+        "release.key.pub",
+        "host.pem",
+    ],
 )
-def test_no_output_is_named_like_what_people_write_unless_it_is_a_net(
+def test_no_output_is_named_like_what_people_keep_unless_it_is_a_net_or_a_bundle(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -157,6 +182,10 @@ def test_no_output_is_named_like_what_people_write_unless_it_is_a_net(
         said = capsys.readouterr().err
         assert f"error[F1017]: {name}: that is the name of a" in said
         assert f"which {option} does not write" in said
+    for command, option in sorted(named_as(WRITTEN_BUNDLE)):
+        if not name.endswith(".bundle"):
+            assert main(line(command, (option, name))) == 2
+            assert "that is the name of a" in capsys.readouterr().err
     for command, option in sorted(named_as(WRITTEN_NET)):
         if "firable" not in name:
             assert main(line(command, (option, name))) == 2

@@ -140,6 +140,8 @@ def test_a_secret_key_is_its_owners_alone_and_never_overwritten(tmp_path: Path) 
     for path in (key, tmp_path / "no folder" / "key"):
         with pytest.raises(InputError, match="F1017"):
             make_key(path)
+    with pytest.raises(InputError, match="this is a directory"):
+        make_key(tmp_path)
     key.unlink()
     with pytest.raises(InputError, match="F1017"):  # its public half still stands there
         make_key(key)

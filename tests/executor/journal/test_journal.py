@@ -140,6 +140,18 @@ def test_journal_of_another_bundle_is_refused(tmp_path: Path) -> None:
     )
 
 
+def test_of_the_journal_of_another_bundle_it_is_told_that_it_may_be_taken_over(tmp_path: Path) -> None:
+    filled(tmp_path).close()
+    with pytest.raises(InputError) as error:
+        sqlite(tmp_path, "d2")
+    assert error.value.diagnostics[0].hint.endswith(
+        "`firable takeover` lets a new bundle go on where that one has stopped"
+    )
+    with pytest.raises(InputError) as error:
+        sqlite(tmp_path, machines=("a", "c"))
+    assert "takeover" not in error.value.diagnostics[0].hint
+
+
 def test_journal_of_other_machines_is_refused(tmp_path: Path) -> None:
     filled(tmp_path).close()
     code, message = refused(lambda: sqlite(tmp_path, machines=("a", "c")))
