@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import ssl
+import stat
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -244,7 +245,10 @@ def _token_kept(path: Path) -> str:
     from firable.nets.writing import stands
 
     if stands(path):
-        return _token_read(path)
+        token = _token_read(path)
+        if path.stat().st_mode & stat.S_IROTH:
+            raise _open_to_all(path)
+        return token
     token = new_token()
     try:
         descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
@@ -263,6 +267,15 @@ def _token_read(path: Path) -> str:
     if not token or not token.isprintable() or " " in token:
         raise _file_refusal("F1001", path, ValueError("it is empty" if not token else "it is not one word in one line"))
     return token
+
+
+def _open_to_all(path: Path) -> InputError:
+    from firable.nets.diagnostics import Diagnostic, InputError
+    from firable.nets.source import printable
+
+    name = printable(str(path))
+    hint = f"`chmod o-r {name}`; where somebody may have read it, remove it: the run makes another"
+    return InputError([Diagnostic("F5060", f"{name}: everybody on this host can read this token", hint)])
 
 
 def _file_refusal(code: str, path: Path, error: Exception) -> InputError:

@@ -214,7 +214,7 @@ def _show(report: Report) -> None:
         text.show_diagnostic(note)
     text.heading(report.net, report.input)
     if not report.run["recorded_on_this_net"]:
-        click.echo("  recorded on another version of this net")
+        click.echo("  recorded on another net, or another version of this one")
     if report.run["told"]:
         click.echo()
         for line in text.told_steps(report.net, report.run["told"]):

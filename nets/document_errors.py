@@ -106,6 +106,20 @@ _KINDS: Final = {
 """By the key of its version, what each kind of file is, and what reads it."""
 
 
+_VERSION_LINE: Final = re.compile(r"(firable\w*):\s*\d+\s*(?:#.*)?")
+
+
+def of_another_kind(source: Source) -> Diagnostic | None:
+    """What is wrong with a file of queries that is a file of another kind, by the line of its version (F1018)."""
+    for number, line in enumerate(source.lines, 1):
+        found = _VERSION_LINE.fullmatch(line)
+        if found is not None and found[1] in _KINDS:
+            what, readers = _KINDS[found[1]]
+            hint = f"{what} is for {readers}; a file of queries has lines such as `name: AG not deadlock`"
+            return Diagnostic("F1018", f"this is {what}, and no file of queries", hint, span=source.span(number, 1))
+    return None
+
+
 def version_problem(source: Source, tree: Node, shape: Shape = NET) -> Diagnostic | None:
     """What is wrong with the line such as `firable: 1`, which tells what file this is and of which version."""
     wanted = shape.version

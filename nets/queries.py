@@ -147,7 +147,11 @@ def read_queries(path: str | Path, net: Net, renamed: Mapping[str, str] | None =
 
 def parse_queries(text: str, net: Net, file: str = "<queries>") -> tuple[Query, ...]:
     """Read the lines of a file of queries; raises `InputError` as `read_queries` does."""
+    from firable.nets.document_errors import of_another_kind
+
     source = Source(file, text)
+    if (problem := of_another_kind(source)) is not None:
+        raise InputError([problem])
     reading = _Lines(source, net)
     queries = tuple(reading.queries())
     if reading.problems:

@@ -77,7 +77,9 @@ class Log:
 
     def began(self, net: str, machines: Iterable[str]) -> None:
         """The host has begun to run."""
-        self._tell(logging.INFO, "began", {"net": net, "machines": list(machines)})
+        self._tell(
+            logging.INFO, "began", {"net": net, "machines": [machine or "the coordinator" for machine in machines]}
+        )
 
     def seen(self, event: Event) -> None:
         """An event of the trace; votes and applications stand there alone."""

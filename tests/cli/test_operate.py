@@ -18,6 +18,7 @@ from support.waiting import PATIENCE_SECONDS, until
 from firable.cli.main import main
 from firable.cli.operate import ServeOptions
 from firable.executor.operating.control import new_token
+from firable.nets.diagnostics import InputError
 from firable.semantics.trace import CommandSent, Noted, read_trace
 
 
@@ -173,6 +174,18 @@ def test_the_token_is_for_its_owner_alone_and_no_other_gets_in(
     process.communicate(timeout=PATIENCE_SECONDS)
     notes = [event for event in read_trace(folder / "run.trace").events if isinstance(event, Noted)]
     assert [dict(note.data) for note in notes if note.note == "not let in"] == [{"what": "/stop", "by": "127.0.0.1"}]
+
+
+def test_a_token_that_everybody_on_the_host_can_read_opens_no_endpoint(tmp_path: Path) -> None:
+    token = tmp_path / "token"
+    token.write_text(new_token())
+    for mode in (0o600, 0o640):  # a group may be that of the operators
+        token.chmod(mode)
+        assert ServeOptions("127.0.0.1:0", token_file=str(token)).service("cell.bundle") is not None
+    token.chmod(0o644)
+    with pytest.raises(InputError, match="everybody on this host can read this token") as refused:
+        ServeOptions("127.0.0.1:0", token_file=str(token)).service("cell.bundle")
+    assert refused.value.diagnostics[0].code == "F5060"
 
 
 def test_who_may_operate_is_told_as_it_is_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -62,6 +62,7 @@ def test_queries_are_answered_beside_the_verdicts(
         (("--query", "EF nowhere"), "error[F2002]: there is no place 'nowhere'"),
         (("--queries", "nowhere"), "error[F1001]"),
         (("--queries", "FILE"), "error[F1018]"),
+        (("--queries", "NET"), "NET:2:1: error[F1018]: this is a net file, and no file of queries"),
         (("--queries", "SAME", "--query", "live"), "error[F2001]: 'query-1'"),
     ],
 )
@@ -70,6 +71,7 @@ def test_a_query_that_is_none_is_refused(
 ) -> None:
     (tmp_path / "FILE").write_text("AG EF start\n", "utf-8")
     (tmp_path / "SAME").write_text("query-1: AG EF start\n", "utf-8")
-    placed = [str(tmp_path / one) if one in {"FILE", "SAME"} else one for one in arguments]
+    (tmp_path / "NET").write_text("# a cell\nfirable: 1\ncell: other\n", "utf-8")
+    placed = [str(tmp_path / one) if one in {"FILE", "SAME", "NET"} else one for one in arguments]
     assert main(["check", "catalogue:one_robot", *placed]) == 2
     assert told in capsys.readouterr().err

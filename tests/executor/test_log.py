@@ -49,7 +49,7 @@ def test_a_log_tells_how_a_run_began_and_ended_and_what_failed_with_what_waits_f
         ("error", "fault"),
         ("error", "ended"),
     ]
-    assert told[0]["machines"] == ["", "system", "robot", "mc", "conveyor"]
+    assert told[0]["machines"] == ["the coordinator", "system", "robot", "mc", "conveyor"]
     assert "is overdue" in told[1]["message"]
     assert any("waits for mc.clamped" in sentence for sentence in told[2]["blocked"])
     assert all(line["time"].endswith("Z") for line in told)
