@@ -15,7 +15,7 @@ from firable.cli.options import load_net, plant_for, write_text
 from firable.cli.text import show_diagnostic
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
     from firable.executor.cell.disturbances import Disturbance
     from firable.executor.cell.plant import Plant
@@ -132,13 +132,13 @@ def sim(
 async def _bound(
     net: Net, protocols: list[str], bind: str | None, model: PlantModel
 ) -> tuple[Binding, dict[str, FarEnd], Callable[[], None]]:
-    """The binding, made or read, the ends that it leads to, and what writes one that was made, once these are there."""
+    """The binding, made or read, the ends that it leads to, and what tells of these, and writes one that was made."""
     from firable.executor.drivers.binding import parse_binding, read_binding
-    from firable.executor.drivers.far_side.ends import PORTS, binding_text, ends_of
+    from firable.executor.drivers.far_side.ends import PORTS, binding_text, ends_of, ports_of
 
     if not protocols:
         binding = read_binding(str(bind))
-        return binding, ends_of(binding), lambda: None
+        return binding, ends_of(binding), lambda: _tell_ports(str(bind), ports_of(binding))
     path = bind or f"{net.name}.bind.yaml"
     _refuse_what_is_not_ours(path)
     ends: dict[str, FarEnd] = {}
@@ -154,9 +154,13 @@ async def _bound(
 
     def write() -> None:
         write_text(path, _sealed(text))
-        click.echo(f"{path}: {', '.join(f'{name} at {port}' for name, port in ports.items())}")
+        _tell_ports(path, ports)
 
     return binding, ends | ends_of(binding.without(set(ends))), write
+
+
+def _tell_ports(path: str, ports: Mapping[str, int | str]) -> None:
+    click.echo(f"{path}: {', '.join(f'{name} at {port}' for name, port in ports.items())}")
 
 
 def _sealed(text: str) -> str:

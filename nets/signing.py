@@ -152,6 +152,8 @@ def _secret(path: str | Path) -> Ed25519PrivateKey:
         raise _refusal("F5024", path, "the key is locked by a passphrase", "unlock it for signing") from None
     except (ValueError, UnsupportedAlgorithm):
         hint = "`firable sign --make-key FILE` makes one"
+        if str(path).endswith(".pub"):
+            hint = "name the file without .pub: the public key is for who trusts it"
         raise _refusal("F5024", path, "this is no secret key", hint) from None
     if not isinstance(key, Ed25519PrivateKey):
         raise _refusal("F5024", path, "this is a key of another kind than Ed25519", "make one of that kind")

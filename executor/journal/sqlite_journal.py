@@ -253,7 +253,7 @@ def machines_of(path: Path | str) -> tuple[str, ...]:
 _NOTHING: Final = "nothing stands in it"
 
 
-def _damaged(path: Path, what: str, *, is_alone: bool = False) -> NoReturn:
+def _damaged(path: Path, what: str, *, is_alone: bool = False, is_alien: bool = False) -> NoReturn:
     message = f"{printable(str(path))}: the journal is damaged: {what}"
     name = printable(path.name)
     files = f"{name}, {name}-wal, {name}.generation and {name}.cell"
@@ -263,6 +263,8 @@ def _damaged(path: Path, what: str, *, is_alone: bool = False) -> NoReturn:
     )
     if is_alone:
         hint = f"where it was copied without {name}-wal and {name}.generation, copy these, too; else {hint}"
+    if is_alien:
+        hint = f"where {name} was never a journal, name the one that is; else {hint}"
     raise InputError([Diagnostic("F5032", message, hint)])
 
 
@@ -280,7 +282,7 @@ def _failures(path: Path, done: str) -> Iterator[None]:
         if name.startswith(("SQLITE_CORRUPT", "SQLITE_NOTADB", "SQLITE_ERROR")) or not (
             name or isinstance(error, OSError)
         ):
-            _damaged(path, str(error))
+            _damaged(path, str(error), is_alien=name.startswith("SQLITE_NOTADB"))
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         if name.startswith(("SQLITE_CANTOPEN", "SQLITE_IOERR", "SQLITE_READONLY")):
             reason = _why_not_opened(path) or reason

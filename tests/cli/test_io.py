@@ -60,13 +60,15 @@ class Cell:
 def cell(tmp_path: Path) -> Iterator[Cell]:
     """The one-robot cell over Modbus, of which the completion of a grasp and the sensor of MC may be forced."""
     bind = tmp_path / "cell.bind.yaml"
-    text = unhurried(binding_text(NET, {"modbus": str(free_port())}, SENSORS))
+    port = free_port()
+    text = unhurried(binding_text(NET, {"modbus": str(port)}, SENSORS))
     text = text.replace("write: {holding 10: 5}}", "write: {holding 10: 5}, force: true}")
     held = "mc.part_present: {device: modbus, read: coil 20, on_loss: hold, force: true}"
     bind.write_text("\n".join(f"  {held}" if "mc.part_present:" in line else line for line in text.split("\n")))
     serving = firable("sim", "catalogue:one_robot", "--bind", str(bind), "--workpieces", "1", "--speed", "40")
     served = Cell(serving, bind)
     try:
+        assert served.line_with(" at ") == f"{bind}: modbus at {port}\n"
         served.line_with("serving 'one-robot'")
         yield served
     finally:

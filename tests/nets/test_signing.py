@@ -127,8 +127,9 @@ def test_what_is_no_key_is_refused(bundle: Path) -> None:
     for name in ("ours", "other.pub", "cell.bundle"):  # a secret key is not what one gives away
         assert "F5024" in refused(bundle, name)
     for name in ("ours.pub", "other", "locked", "cell.bundle"):
-        with pytest.raises(InputError, match="F5024"):
+        with pytest.raises(InputError, match="F5024") as error:
             sign(read_bundle(bundle), bundle, bundle.with_name(name))
+        assert ("without .pub" in error.value.diagnostics[0].hint) == name.endswith(".pub")
     assert "F1001" in refused(bundle, "missing.pub")
 
 

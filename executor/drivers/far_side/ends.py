@@ -143,6 +143,11 @@ def ends_of(binding: Binding) -> dict[str, FarEnd]:
     return {name: end for port, names in at.items() for name, end in _ends(binding, port, names).items()}
 
 
+def ports_of(binding: Binding) -> dict[str, int | str]:
+    """Where on this host each device of a binding that can be served is: a port, or the path of a serial line."""
+    return {name: _address(binding, name)[1] for name in binding.document.devices}
+
+
 def _address(binding: Binding, name: str) -> tuple[str, int | str]:
     """The host and the port of a device; of one on a serial line no host, and a path."""
     options = binding.options[name].model_dump()

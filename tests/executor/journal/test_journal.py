@@ -307,6 +307,9 @@ def test_damaged_journal_names_the_files_that_belong_to_it(tmp_path: Path) -> No
         sqlite(tmp_path)
     files = "cell.journal, cell.journal-wal, cell.journal.generation and cell.journal.cell"
     assert f"move {files} away" in caught.value.diagnostics[0].hint
+    assert caught.value.diagnostics[0].hint.startswith(
+        "where cell.journal was never a journal, name the one that is; else "
+    )
 
 
 def test_folder_that_is_not_there_is_told_in_the_words_of_the_system(tmp_path: Path) -> None:
