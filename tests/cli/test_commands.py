@@ -507,3 +507,8 @@ def test_what_fails_before_anything_fires_is_not_told_by_the_firings_of_another(
     out = capsys.readouterr().out
     assert out.count("already in the initial marking:") == 2
     assert "the same firings" not in out
+
+
+def test_the_package_is_run_as_the_command_is() -> None:
+    told = subprocess.run([sys.executable, "-m", "firable", "--version"], capture_output=True, text=True, check=True)
+    assert told.stdout.startswith("firable ")
