@@ -85,7 +85,7 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
     "no model": (["--controller", "robot", "--bind", "x", "--join", "tcp/[::1]:1", "--watch", "stop"], "with --plant"),
     "no model of a whole run": (["--bind", "x", "--watch", "stop"], "with --plant"),
     "steps at the terminal": (["--controller", "robot", "--dry-run", "1", "--step"], "`firable operate` steps"),
-    "one file for two": (["--controller", "mc", "--trace", "{bundle}", "--journal", "x"], "overwrite"),
+    "one file for two": (["--controller", "mc", "--trace", "{bundle}", "--journal", "x"], "error[F1017]"),
 }
 
 
