@@ -25,7 +25,8 @@ _FIGURES: Final = re.compile(r"[\d.]+")
 _OPCUA: Final = "opc.tcp"
 
 
-def _refuse(said: str, hint: str) -> NoReturn:
+def refuse(said: str, hint: str) -> NoReturn:
+    """Refuse what an option holds, from a validator of pydantic, in these words."""
     raise PydanticCustomError("refused", "refused", {"error": said, "hint": hint})
 
 
@@ -65,7 +66,7 @@ def _host(text: str) -> str:
     bare = (host if colon and port.isdecimal() else rest).strip("[]")
     if bare != text and is_host(bare):
         hint = f"write `host: {bare}`" + (f" and `port: {port}`" if colon and port.isdecimal() else "")
-    _refuse(f"{quoted(text)} is no host", hint)
+    refuse(f"{quoted(text)} is no host", hint)
 
 
 def _opcua_url(text: str) -> str:
@@ -78,7 +79,7 @@ def _opcua_url(text: str) -> str:
     if not is_right:
         scheme = text.partition(":")[0]
         hint = "" if scheme == _OPCUA else did_you_mean(scheme, [_OPCUA])
-        _refuse(
+        refuse(
             f"{quoted(text)} is no `{_OPCUA}://HOST:PORT/`", f"{hint}write it such as `{_OPCUA}://192.168.0.10:4840/`"
         )
     return text
@@ -87,7 +88,7 @@ def _opcua_url(text: str) -> str:
 def _port_of_a_line(text: str) -> str:
     if "/" in text and "://" not in text:
         return text
-    _refuse(f"{quoted(text)} is no path of a serial port", "write a path such as `/dev/ttyUSB0`")
+    refuse(f"{quoted(text)} is no path of a serial port", "write a path such as `/dev/ttyUSB0`")
 
 
 HostName = Annotated[str, AfterValidator(_host)]

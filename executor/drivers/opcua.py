@@ -7,6 +7,10 @@ whose status is not good is no value. What is written takes the type that its no
 which is the number of a command, goes out when the others are confirmed, because a server may take those of one
 request in any order.
 
+A node id names its namespace by an index, and a server that is configured anew, or only started again, may have its
+namespaces in another order: the same index and name are then another node, which would be read as if it were the one.
+So a binding can say which namespaces its indexes mean (`namespaces`); each connection looks where the server has them.
+
 A client that has lost its connection is not repaired: asyncua can reconnect by itself, and would then bring back
 subscriptions with what was queued in the meantime. A new client begins with what the nodes hold now. So it is where the
 server answers, and has dropped the subscription or tells of it no more: what was read once would look good for ever.
@@ -19,8 +23,10 @@ from __future__ import annotations
 import asyncio
 import re
 from base64 import b64decode, b64encode
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from time import monotonic
@@ -28,9 +34,9 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 from urllib.parse import urlsplit
 from uuid import UUID
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from firable.executor.drivers.addresses import OpcUaUrl, one_name
+from firable.executor.drivers.addresses import OpcUaUrl, one_name, refuse
 from firable.executor.drivers.cancelling import ended
 from firable.executor.drivers.device import (
     Connection,
@@ -65,6 +71,9 @@ OVERFLOW: Final = 0x480
 """The bits of a status by which a server says that it has dropped changes from a queue."""
 
 
+_NAMESPACE_MAX: Final = 0xFFFF
+
+
 class OpcUaSecurity(BaseModel):
     """How messages are signed and encrypted, and the files of who is who (PEM or DER).
 
@@ -82,13 +91,31 @@ class OpcUaSecurity(BaseModel):
 
 
 class OpcUaOptions(Options):
-    """A server, and how often it looks at its nodes and tells of them."""
+    """A server, and how often it looks at its nodes and tells of them; what the indexes of its node ids mean."""
 
     url: OpcUaUrl
     every_s: float = Field(default=0.01, gt=0, le=60, allow_inf_nan=False)
     user: str | None = None
     password: Password = None
     security: OpcUaSecurity | None = None
+    namespaces: dict[str, str] = Field(default_factory=dict)
+
+    @field_validator("namespaces")
+    @classmethod
+    def _are_namespaces(cls, namespaces: dict[str, str]) -> dict[str, str]:
+        for index, uri in namespaces.items():
+            if not re.fullmatch("[1-9][0-9]{0,4}", index) or int(index) > _NAMESPACE_MAX:
+                refuse(f"'{index}' is no index of a namespace", "write a number from 1 to 65535; 0 is that of OPC UA")
+            if not uri:
+                refuse(f"the namespace of {index} has no name", "write the URI that the server has for it")
+        twice = [uri for uri, count in Counter(namespaces.values()).items() if count > 1]
+        if twice:  # its nodes would have two spellings
+            refuse(f"'{twice[0]}' has two indexes", "give each namespace one")
+        return namespaces
+
+    def meant(self) -> dict[int, str]:
+        """What each index means."""
+        return {int(index): uri for index, uri in self.namespaces.items()}
 
     def far_end(self) -> object:
         """The server at an address; what stands behind that only chooses among the ways to speak with it."""
@@ -99,8 +126,11 @@ class OpcUaOptions(Options):
 class OpcUaConnection(Stepwise):
     """A session with a server, and a subscription to the nodes that are read."""
 
-    def __init__(self, client: Client, wanted: Wanted) -> None:
+    def __init__(self, client: Client, wanted: Wanted, namespaces: Mapping[int, str]) -> None:
         self.client = client
+        self.namespaces = namespaces
+        self.indexes: dict[int, int] = {}
+        """Where the server has each of them."""
         self.wanted = wanted
         self.told: asyncio.Queue[tuple[Point, Value] | Exception] = asyncio.Queue()
         self.points: dict[str, Point] = {}
@@ -118,7 +148,13 @@ class OpcUaConnection(Stepwise):
         self.client.connection_lost_callback = self._lost
         await self.client.connect()
         drop_at_close(self._transport)
-        nodes = [self.client.get_node(point) for point in self.wanted.read]
+        if self.namespaces:
+            there = await self.client.get_namespace_array()
+            for index, uri in self.namespaces.items():
+                if uri not in there:
+                    raise LinkError(f"the server has no namespace '{uri}'")
+                self.indexes[index] = there.index(uri)
+        nodes = [self._node(point) for point in self.wanted.read]
         self.points = {node.nodeid.to_string(): point for node, point in zip(nodes, self.wanted.read, strict=True)}
         counts = self._counts(every_s)
         asked = CreateSubscriptionParameters(
@@ -246,11 +282,21 @@ class OpcUaConnection(Stepwise):
         )
         return [task for task in several if task is not None]
 
+    def _node(self, point: Point) -> Node:
+        from asyncua.ua.uatypes import Int16, NodeId
+
+        found = NodeId.from_string(point)
+        if self.namespaces and found.NamespaceIndex:
+            if found.NamespaceIndex not in self.indexes:
+                raise LinkError(f"`namespaces` does not say what the index of '{point}' means")
+            found = replace(found, NamespaceIndex=Int16(self.indexes[found.NamespaceIndex]))
+        return self.client.get_node(found)
+
     async def _write(self, writes: Writes, withheld: int) -> None:
         from asyncua import ua
         from asyncua.ua.uaerrors import UaError
 
-        nodes = [self.client.get_node(point) for point, _ in writes]
+        nodes = [self._node(point) for point, _ in writes]
         for (point, _), node in zip(writes, nodes, strict=True):
             if point not in self.types:
                 try:
@@ -284,7 +330,6 @@ def _typed(value: Value, kind: Any) -> Value:
 
 
 _NODE: Final = re.compile(r"(?:ns=([0-9]{1,9});)?([isgb])=([^\x00-\x1f\x7f]+)")
-_NAMESPACE_MAX: Final = 0xFFFF
 _NUMBER_MAX: Final = 0xFFFF_FFFF
 
 
@@ -343,7 +388,7 @@ class OpcUa:
         if options.user is not None:
             client.set_user(options.user)
             client.set_password(options.password or "")
-        connection = OpcUaConnection(client, wanted)
+        connection = OpcUaConnection(client, wanted, options.meant())
         try:
             if options.security is not None:
                 await _secure(client, options.security)

@@ -221,7 +221,8 @@ def _ends(binding: Binding, port: int | str, names: Sequence[str]) -> dict[str, 
         case "opcua":
             from firable.executor.drivers.far_side.opcua_server import OpcUaEnd
 
-            end = OpcUaEnd(points, port)
+            named = [binding.options[name].model_dump()["namespaces"] for name in names]
+            end = OpcUaEnd(points, port, namespaces={int(index): uri for one in named for index, uri in one.items()})
         case _:
             from firable.executor.drivers.far_side.mqtt_device import MqttEnd
 

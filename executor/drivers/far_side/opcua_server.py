@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 from asyncua import ua
@@ -24,10 +25,16 @@ class OpcUaEnd:
     """A server in the network of this host; `port` 0 takes a free one."""
 
     def __init__(
-        self, points: Mapping[Point, Value], port: int = 0, secure: Callable[[Server], Awaitable[None]] | None = None
+        self,
+        points: Mapping[Point, Value],
+        port: int = 0,
+        secure: Callable[[Server], Awaitable[None]] | None = None,
+        namespaces: Mapping[int, str] = MappingProxyType({}),
     ) -> None:
         self.secure = secure
         """What makes the server demand more than that somebody comes."""
+        self.namespaces = namespaces
+        """What the server calls its namespaces, where it matters."""
         self.faults = Faults()
         self.values = dict(points)
         self.relay = Relay(self.faults, port, garbles=False)
@@ -86,7 +93,10 @@ class OpcUaEnd:
         else:
             await self.secure(self.server)
         self.server.set_endpoint("opc.tcp://127.0.0.1:0/")
-        await self.server.register_namespace("firable")
+        if (own := self.namespaces.get(1)) is not None:
+            await self.server.set_application_uri(own)
+        for index in range(2, max(self.namespaces, default=2) + 1):  # 0 is that of OPC UA
+            await self.server.register_namespace(self.namespaces.get(index, f"firable:{index}"))
         for point, value in self.values.items():
             kind = {bool: ua.VariantType.Boolean, str: ua.VariantType.String}.get(type(value), ua.VariantType.Int64)
             node_id = ua.NodeId.from_string(point)

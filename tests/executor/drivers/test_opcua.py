@@ -8,11 +8,13 @@ from typing import Any
 import pytest
 
 from firable.executor.drivers.bench import PATIENCE_S, Far
+from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.conformance import DriverConformance
-from firable.executor.drivers.device import LinkError, Use, Wanted
+from firable.executor.drivers.device import LinkError, Point, Use, Value, Wanted
 from firable.executor.drivers.far_side.machine import ROLES
 from firable.executor.drivers.far_side.opcua_server import OpcUaEnd
 from firable.executor.drivers.opcua import KIND, OpcUaOptions, spelling
+from firable.nets.diagnostics import InputError
 
 POINTS = {role: f"ns=2;s=M.{role}" for role in (*ROLES, "number")}
 BITS = {"sensor", "closed", "button", "tripped", "output"}
@@ -106,6 +108,59 @@ class TestOpcUa(DriverConformance):
             await self.end.stop()
 
         self.run(main())
+
+
+@pytest.mark.parametrize("at", [{2: "urn:a", 3: "urn:b"}, {2: "urn:b", 3: "urn:a"}, {4: "urn:a"}])
+def test_a_node_is_found_wherever_the_server_has_its_namespace(at: dict[int, str]) -> None:
+    async def main() -> None:
+        own = next(index for index, uri in at.items() if uri == "urn:a")
+        points: dict[Point, Value] = {f"ns={index};s=M.{name}": index == own for index in at for name in ("done", "go")}
+        end, written = OpcUaEnd(points, namespaces=at), asyncio.Queue[tuple[Point, Value]]()
+        await end.start(lambda point, value: written.put_nowait((point, value)))
+        url, done, go = f"opc.tcp://127.0.0.1:{end.port}/", "ns=7;s=M.done", "ns=7;s=M.go"
+        options = OpcUaOptions.model_validate({"url": url, "namespaces": {"7": "urn:a"}})
+        try:
+            connection = await KIND.connect(options, Wanted((done,), PATIENCE_S))
+            assert list(await connection.read()) == [(done, True)]
+            await connection.write(((go, False),))
+            assert await asyncio.wait_for(written.get(), PATIENCE_S) == (f"ns={own};s=M.go", False)
+            with pytest.raises(LinkError, match=r"does not say what the index of 'ns=2;s=M\.go' means"):
+                await connection.write((("ns=2;s=M.go", True),))
+            await connection.close()
+            elsewhere = options.model_copy(update={"namespaces": {"7": "urn:c"}})
+            with pytest.raises(LinkError, match="the server has no namespace 'urn:c'"):
+                await KIND.connect(elsewhere, Wanted((done,), PATIENCE_S))
+        finally:
+            await end.stop()
+            await end.end()
+
+    asyncio.run(main())
+
+
+@pytest.mark.parametrize(
+    ("namespaces", "told"),
+    [
+        ("{0: urn:a}", "0"),
+        ("{two: urn:a}", "two"),
+        ('{2: ""}', "2"),
+        ("{2: urn:a, 3: urn:a}", "'urn:a' has two indexes"),
+    ],
+)
+def test_namespaces_that_mean_nothing_are_refused_where_they_stand(namespaces: str, told: str) -> None:
+    text = f"""firable_bind: 1
+cell: n
+devices:
+  D:
+    driver: opcua
+    url: "opc.tcp://127.0.0.1:4840/"
+    namespaces: {namespaces}
+"""
+    with pytest.raises(InputError) as caught:
+        parse_binding(text)
+    (problem,) = caught.value.diagnostics
+    assert told in problem.message
+    assert problem.span is not None
+    assert problem.span.line == 7
 
 
 def test_a_server_that_takes_a_connection_and_says_nothing_has_not_answered_in_time() -> None:
