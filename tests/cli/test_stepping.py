@@ -109,7 +109,7 @@ def reset_while_somebody_types(at: Terminal) -> None:
 
 def said(at: Terminal) -> None:
     (place,) = uncertain(at.host)
-    assert at.host.say(place, Answer.NOT_RECEIVED)
+    assert not at.host.say(place, Answer.NOT_RECEIVED)
 
 
 def resumed(at: Terminal) -> None:
