@@ -33,6 +33,9 @@ LOOK_SECONDS: Final = 0.01
 ANSWERS: Final = 3
 """So many times as long as an answer may take is waited until it is told that a device has not taken a command."""
 
+_INSTANT_SECONDS: Final = 1e-6
+"""So much too early a timer may come."""
+
 _POINTS: Final = "are the points written as the device has them?"
 """What is asked where a device is silent: a topic that is written wrong is no error to a broker."""
 
@@ -88,7 +91,13 @@ class BoundDevice:
         self.was_ready = False
         self.ready_seconds = 0.0
         """When there was a connection first, by the event loop."""
-        self.alarm: asyncio.TimerHandle | None = None
+        self.start: asyncio.TimerHandle | None = None
+        """When it should have been reached first."""
+        self.grace: asyncio.TimerHandle | None = None
+        """When the first of what is missed is lost."""
+        self.missed: dict[str, float] = {}
+        """The signals that were shown once and not since a loss, with when they are lost, by the event loop."""
+        self.missed_why = ""
         self.due: asyncio.TimerHandle | None = None
         """When all signals should have been shown."""
         self.is_overdue = False
@@ -125,13 +134,13 @@ class BoundDevice:
         """Keep the device connected."""
         alive = self.document.alive
         seen = "reached" if alive is None else f"seen to be alive, by '{alive.read}',"
-        self._alarm(self.document.start_s, f"not {seen} since the start")
         loop = asyncio.get_running_loop()
+        self.start = loop.call_later(self.document.start_s, self._not_met, f"not {seen} since the start")
         begun = loop.call_later(self.document.start_s, self._must_move) if self.contacts.contacts else None
         try:
             await self.kept.run()
         finally:
-            for alarm in (self.alarm, self.due, begun, *self.patience.values()):
+            for alarm in (self.start, self.grace, self.due, begun, *self.patience.values()):
                 if alarm is not None:
                     alarm.cancel()
             self._give_up_by_hand(self._unforced)
@@ -255,7 +264,9 @@ class BoundDevice:
         now = self.driver.clock.now_seconds() if self.driver.clock is not None else 0.0
         changes, faults = self.image.take(batch, now)
         if self.unseen:
-            self.unseen.difference_update(*(self.image.reads.get(point, ()) for point, _ in batch))
+            for name in {name for point, _ in batch for name in self.image.reads.get(point, ())}:
+                self.unseen.discard(name)
+                self.missed.pop(name, None)
         if not opened and not self.contacts.are_closed:
             self.contacts.read(self.image.readings)
             if self.driver.may_move:  # what was sent before that has waited for it
@@ -285,8 +296,8 @@ class BoundDevice:
 
     def ready(self) -> None:
         """A new connection has told what the device shows."""
-        if self.alarm is not None and not (self.was_ready and self.unseen):
-            self.alarm.cancel()
+        if self.start is not None:
+            self.start.cancel()
         self.note("connected again" if self.was_ready else "connected")
         self.noted = ""
         for channel in self.channels.values():
@@ -314,15 +325,20 @@ class BoundDevice:
         self.note(f"has not taken {_given(channel, order)}: {_POINTS}")
 
     def lost(self, why: str) -> None:
-        """There is no connection, or none any more."""
+        """There is no connection, or none any more: also of what was only read by then, nobody knows what it is now."""
+        gone = set(self.image.signals) if self.is_ready.is_set() else self.image.signals.keys() - self.unseen
         self.unseen.update(self.image.signals)
         if self.is_ready.is_set():
             self.is_ready.clear()
             self._give_up_by_hand(why)
-            if self.contacts.contacts:
+        if gone:
+            if gone.intersection(self.contacts.signals()):
                 self._emergency(self.contacts.lost(why))
                 self.image.lost(why, self.contacts.signals())
-            self._alarm(self.document.grace_s, why)
+            self.missed_why = why
+            lost_seconds = asyncio.get_running_loop().time() + self.document.grace_s
+            self.missed = dict.fromkeys(sorted(gone), lost_seconds) | self.missed  # the grace runs from the first loss
+            self._miss()
         if why != self.noted and not self.driver.is_stopped:
             self.noted = why
             self.note(f"not connected: {why}")
@@ -396,24 +412,36 @@ class BoundDevice:
             open_ones = " and ".join(f"'{name}'" for name in sorted(self.contacts.open_ones))
             self._emergency(f"{open_ones} was not read within {self.document.start_s:g} s")
 
-    def _alarm(self, after_s: float, why: str) -> None:
-        if self.alarm is not None:
-            self.alarm.cancel()
-        if after_s:
-            self.alarm = asyncio.get_running_loop().call_later(after_s, self._give_up, why)
-        else:
-            self._give_up(why)
+    def _not_met(self, why: str) -> None:
+        """The device was not reached in the time that its start may take: the loss policies hold."""
+        self.missed.clear()
+        self._tell(*self.image.lost(why))
 
-    def _give_up(self, why: str) -> None:
-        """The device has been lost for longer than is waited: the loss policies hold.
+    def _miss(self) -> None:
+        """Wait for the end of the first grace."""
+        if self.grace is not None:
+            self.grace.cancel()
+        loop = asyncio.get_running_loop()
+        if self.missed and (first_seconds := min(self.missed.values())) > loop.time():
+            self.grace = loop.call_at(first_seconds, self._give_up)
+        elif self.missed:
+            self._give_up()
 
-        Where it is connected again, they hold for what it has not shown since: a broker may have come back without it.
+    def _give_up(self) -> None:
+        """Some signals were lost for longer than is waited: the loss policies hold for them.
+
+        Where the device is connected again it has not shown them since: a broker may have come back without them.
         """
-        if not self.is_ready.is_set():
-            self._tell(*self.image.lost(why))
-            return
-        gone = [name for name in sorted(self.unseen) if self.image.readings[name].quality is Quality.GOOD]
-        self._tell(*self.image.lost(f"not shown since it was connected again: {why}", gone))
+        now = asyncio.get_running_loop().time() + _INSTANT_SECONDS
+        over = [name for name, seconds in self.missed.items() if seconds <= now]
+        for name in over:
+            del self.missed[name]
+        why = self.missed_why
+        if self.is_ready.is_set():
+            over = [name for name in over if self.image.readings[name].quality is Quality.GOOD]
+            why = f"not shown since it was connected again: {why}"
+        self._tell(*self.image.lost(why, over))
+        self._miss()
 
     def _tell(self, changes: Sequence[Change], faults: Sequence[str]) -> None:
         if self.driver.listener is not None and not self.driver.is_stopped:

@@ -9,7 +9,9 @@ that doubles up to a bound, and is read before it is written, because what the d
 to be sent. The pause is short again when a connection has stood for as long as an answer or a sign of life may take: a
 device that can be read and refuses what is written to it would else be connected, and told of, ten times a second.
 After an emergency stop it is short also then, as each connection brings the safe outputs. It is as long as a line may
-still bring an answer to what was asked before (`device.Owed`), but for a stop: no answer decides anything then.
+still bring an answer to what was asked before (`device.Owed`). The safe outputs of a stop do not wait for that: no
+answer decides anything then. But a line is left only after it, as the driver that follows an emergency stop is the next
+to use it.
 
 A stop breaks off a command that is being written, if it is not confirmed at once, and makes new connections until the
 device has confirmed the safe outputs, or has had its time. On these, and on each connection after an emergency stop,
@@ -175,8 +177,8 @@ class Kept:
         """How many connections there have been."""
         self.stood_seconds = 0.0
         """How long the last of them has stood."""
-        self.owed_seconds = 0.0
-        """How long after its end it may still be answered."""
+        self.owed_until_seconds = -inf
+        """Until when it may still be answered, by the event loop."""
         self.is_connected = False
         self.started = False
         """Whether the safe outputs of the start-up have been written, to a device that is alive."""
@@ -225,6 +227,7 @@ class Kept:
                         except Exception as error:
                             self._break(error)
                             await asyncio.sleep(self.document.retry_s)
+            await asyncio.sleep(self._owed_seconds)  # the next to use the line would take it for an answer
         finally:
             self.stopped.set()
         if self.error is not None:
@@ -249,7 +252,7 @@ class Kept:
         alive = self.document.alive
         enough_s = self.document.timeout_s if alive is None else min(alive.within_s, self.document.timeout_s)
         while not self.stopping:
-            self.stood_seconds = self.owed_seconds = 0.0
+            self.stood_seconds = 0.0
             try:
                 await self._connected()
             except _FAILURES as error:
@@ -257,8 +260,12 @@ class Kept:
             if self.stood_seconds >= enough_s or (self.stood_seconds and self.served.is_latched):
                 pause_s = self.document.retry_s
             with suppress(TimeoutError):
-                await asyncio.wait_for(self._asked_to_stop(), max(pause_s, self.owed_seconds))
+                await asyncio.wait_for(self._asked_to_stop(), max(pause_s, self._owed_seconds))
             pause_s = min(2 * pause_s, self.document.retry_max_s)
+
+    @property
+    def _owed_seconds(self) -> float:
+        return max(0.0, self.owed_until_seconds - asyncio.get_running_loop().time())
 
     def stop(self) -> None:
         """Write the safe outputs and nothing afterwards."""
@@ -306,7 +313,8 @@ class Kept:
                 self.stood_seconds = asyncio.get_running_loop().time() - since_seconds
             self._forget()
             await connection.close()
-            self.owed_seconds = connection.owed_seconds if isinstance(connection, Owed) else 0.0
+            if isinstance(connection, Owed):
+                self.owed_until_seconds = asyncio.get_running_loop().time() + connection.owed_seconds
 
     async def _serve(self, connection: Connection) -> None:
         self.has_read = False

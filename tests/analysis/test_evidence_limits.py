@@ -341,6 +341,20 @@ def test_evidence_that_memory_does_not_suffice_for_says_so() -> None:
     assert lacking["property.accepted_is_carried_out"] == "the memory for evidence was used up"
 
 
+def test_the_time_of_one_search_is_no_reason_why_a_smaller_one_has_too_few_markings(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def in_time(net: Net, discipline: Discipline, budget: Budget, deadline: Deadline) -> ReachabilityGraph:
+        return explore(net, discipline, budget, deadline=deadline if budget.markings <= 200 else Deadline.after(0))
+
+    for most in ("MARKINGS_MAX", "WIDE_MAX"):
+        monkeypatch.setattr(producing, most, 200)
+    monkeypatch.setattr(producing, "explore", in_time)
+    of = producing.Spaces(family_net("philosophers-8"), Discipline.INTERLEAVING, Limits())
+    assert (of.wide, of.many) == (None, None)
+    assert (of.ended(200), of.ended(producing.MANY_MAX)) == ("", "the time for evidence was over")
+
+
 @pytest.mark.parametrize(
     ("error", "why"),
     [

@@ -41,7 +41,7 @@ from firable.analysis.evidence.producing.runs import (
     runs_by_search,
     runs_on_graph,
 )
-from firable.analysis.evidence.producing.spaces import MARKINGS_MAX, WIDE_MAX, Spaces
+from firable.analysis.evidence.producing.spaces import WIDE_MAX, Spaces
 from firable.analysis.evidence.producing.theorems import theorem_on
 from firable.analysis.evidence.producing.unfolding import unfolded_markings
 from firable.analysis.goal import Finding, Limits
@@ -111,9 +111,8 @@ class Certifier:
                 return self._unfolded(claim)
             case ClaimKind.LEADS_TO:
                 if self.spaces.wide is None or self.spaces.wide_markings is None:
-                    raise LackingError(
-                        self.spaces.ended or f"ranks for a response are written for up to {WIDE_MAX:,} markings"
-                    )
+                    many = f"ranks for a response are written for up to {WIDE_MAX:,} markings"
+                    raise LackingError(self.spaces.ended(WIDE_MAX) or many)
                 return progress(self.spaces.wide, self.spaces.wide_markings, claim)
             case ClaimKind.ORDERED:
                 return None if self.spaces.markings is None else Labelling(self.spaces.markings)
@@ -136,7 +135,7 @@ class Certifier:
             except (TooLargeError, BudgetExceeded):
                 pass  # all markings, which a graph finds faster, may be few enough
         if self.spaces.wide_markings is None:
-            raise LackingError(self.spaces.ended or f"a tableau is unfolded on up to {WIDE_MAX:,} markings")
+            raise LackingError(self.spaces.ended(WIDE_MAX) or f"a tableau is unfolded on up to {WIDE_MAX:,} markings")
         return Unfolded(self.spaces.wide_markings)
 
     def asked_for(self, formula: Temporal) -> Unfolded:
@@ -283,7 +282,7 @@ class Certifier:
                 places = tuple(replace(place, marked=bool(home >> p & 1)) for p, place in enumerate(net.places))
                 net = replace(net, places=places, properties=())
             if self.discipline is Discipline.STEP:
-                raise LackingError(self.spaces.ended or f"there are more than {MARKINGS_MAX:,} markings")
+                raise LackingError(self.spaces.ended(WIDE_MAX) or f"there are more than {WIDE_MAX:,} markings")
             found, left = runs_by_search(
                 net, tuple(names), Limits(self.spaces.part_of_a_run(), self.limits.memory_bytes)
             )

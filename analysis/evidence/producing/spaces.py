@@ -45,8 +45,12 @@ class Spaces:
 
     def __init__(self, net: Net, discipline: Discipline, limits: Limits, given: StateSpace[Any] | None = None) -> None:
         self.net, self.discipline, self.limits, self.given = net, discipline, limits, given
-        self.ended = ""
-        """Which budget ended the last exploring, in words; empty where it was for the number of markings."""
+        self._ended: dict[int, str] = {}
+        """Which budget ended the exploring of so many markings, in words."""
+
+    def ended(self, most: int) -> str:
+        """Which budget ended the exploring of so many markings, in words; empty where there are more of them."""
+        return self._ended.get(most, "")
 
     def part(self, share: float) -> Deadline:
         """A part of the time that is left for evidence."""
@@ -89,9 +93,9 @@ class Spaces:
             try:
                 graph = explore(self.net, self.discipline, budget, deadline=self.part(0.2))
             except InputError:  # there is no room for the net itself, and a diagram may need less
-                self.ended = NO_MEMORY
+                self._ended[most] = NO_MEMORY
                 return None
-            self.ended = {"memory": NO_MEMORY, "time": NO_TIME}.get(graph.engine.reason or "", "")
+            self._ended[most] = {"memory": NO_MEMORY, "time": NO_TIME}.get(graph.engine.reason or "", "")
         return graph.until(self.limits.deadline) if graph.complete and graph.n_markings <= most else None
 
     @cached_property

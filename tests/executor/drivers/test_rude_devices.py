@@ -97,10 +97,14 @@ class Owing(Refusing):
     owed_seconds = 30.0
 
 
-def test_a_line_is_not_used_again_while_it_may_still_bring_an_answer_but_for_a_stop() -> None:
-    async def main() -> tuple[float, float]:
+@pytest.mark.parametrize("safe", ["", "safe: {holding 1: 0}, "])
+def test_a_line_is_not_used_again_while_it_may_still_bring_an_answer_but_for_the_safe_outputs_of_a_stop(
+    safe: str,
+) -> None:
+    async def main() -> tuple[list[float], float, float]:
         device, loop = Owing(), asyncio.get_running_loop()
-        document = parse_binding(FLAPPING.replace("TIMEOUT", "10")).document.devices["D"]
+        text = FLAPPING.replace("TIMEOUT", "10").replace("heartbeat:", f"{safe}heartbeat:")
+        document = parse_binding(text).document.devices["D"]
         kept = Kept(document, device, TcpOptions(host="h"), Wanted(("discrete 0",), 10.0), Nobody())
         task = asyncio.create_task(kept.run())
         await until(lambda: len(device.connections_at) == 2, "two connections")
@@ -108,11 +112,12 @@ def test_a_line_is_not_used_again_while_it_may_still_bring_an_answer_but_for_a_s
         stopped_at = loop.time()
         kept.stop()
         await task
-        return device.connections_at[1] - device.connections_at[0], loop.time() - stopped_at
+        return device.connections_at, stopped_at, loop.time()
 
-    pause, stopping = run_in_virtual_time(main())
-    assert pause > 0.99 * Owing.owed_seconds
-    assert stopping < 1
+    at, stopped_at, ended_at = run_in_virtual_time(main())
+    assert at[1] - at[0] > 0.99 * Owing.owed_seconds
+    assert [one - stopped_at < 1 for one in at[2:3]] == ([True] if safe else [])
+    assert ended_at - at[-1] > 0.99 * Owing.owed_seconds, "who uses the line next would take it for an answer"
 
 
 class Latched(Nobody):
@@ -207,3 +212,69 @@ def test_what_a_broker_has_forgotten_is_lost_after_the_grace_though_it_is_connec
     }
     assert heard.faults == [f"D: 'needed' cannot be read: {why}"]
     assert heard.signals[4:] == [("zero", False, None)]
+
+
+def test_the_grace_of_what_a_broker_has_forgotten_runs_on_over_further_losses() -> None:
+    async def main() -> tuple[BoundDevice, list[str], Heard]:
+        driver, heard = BoundDriver(parse_binding(FORGETFUL), (), frozenset()), Heard()
+        driver.clock = driver.listener = heard
+        device = driver.devices["D"]
+        device.contacts.contacts = {}
+        device.read([(name, "1") for name in ("held", "zero", "needed", "shown")])
+        device.ready()
+        told = []
+        for _ in range(3):
+            device.lost("cut")
+            await asyncio.sleep(0.5)
+            device.read([("shown", "1")])
+            device.ready()
+            await asyncio.sleep(0.9)
+            told.append(device.image.readings["needed"].quality.name)
+        return device, told, heard
+
+    device, told, heard = run_in_virtual_time(main())
+    assert told == ["GOOD", "GOOD", "BAD"]
+    assert device.image.readings["shown"].quality is Quality.GOOD
+    assert heard.faults == ["D: 'needed' cannot be read: cut"]
+
+
+def test_what_this_connection_has_shown_is_good_though_the_grace_ends_before_it_is_ready() -> None:
+    async def main() -> Quality:
+        driver, heard = BoundDriver(parse_binding(FORGETFUL), (), frozenset(), latched=True), Heard()
+        driver.clock = driver.listener = heard
+        device = driver.devices["D"]
+        device.read([("needed", "1")])
+        device.ready()
+        device.lost("cut")
+        await asyncio.sleep(2.9)
+        device.read([("needed", "1")])
+        await asyncio.sleep(0.2)  # the safe outputs take their time
+        device.ready()
+        return device.image.readings["needed"].quality
+
+    assert run_in_virtual_time(main()) is Quality.GOOD
+
+
+@pytest.mark.parametrize("latched", [False, True])
+def test_a_contact_that_was_read_by_a_connection_that_was_never_ready_is_open_when_that_is_lost(latched: bool) -> None:
+    """Its safe outputs were not confirmed, so nothing was commanded there; other devices may have been."""
+
+    async def main() -> tuple[BoundDriver, Heard]:
+        driver, heard = BoundDriver(parse_binding(FORGETFUL), (), frozenset(), latched=latched), Heard()
+        driver.clock = driver.listener = heard
+        device = driver.devices["D"]
+        device.read([("door", "1"), ("needed", "1")])
+        assert device.contacts.open_ones == set()
+        device.lost("cut")
+        assert device.contacts.open_ones == {"door"}
+        device.lost("refused")
+        device.read([("shown", "1")])
+        device.ready()
+        await asyncio.sleep(4)
+        assert device.image.readings["needed"].quality is Quality.BAD
+        return driver, heard
+
+    driver, heard = run_in_virtual_time(main())
+    assert not driver.may_move
+    assert heard.emergencies == ([] if latched else ["D: 'door' cannot be read: cut"])
+    assert "D: 'door' is not closed" in driver.against()
