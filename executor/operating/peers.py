@@ -22,7 +22,8 @@ them by the safe outputs of its start, in the middle of their work. So one that 
 until somebody does or `MEET_SECONDS` are over; where another host has said that it has them, until it is let in, or the
 other was gone for `PARTED_SECONDS`; where a third one has let the other in, until it is let in itself, or a person has
 stopped it and started it again; where a coordinator of them is of another bundle or version, as long as that one is
-there, for it tells nobody unlike it whom it has let in. All that is in the situation as long as it lasts.
+there and for `PARTED_SECONDS` more, for it tells nobody unlike it whom it has let in. All that is in the situation as
+long as it lasts. The price is named there, too: their emergency stops are not read meanwhile.
 A host that comes back with its journal drives the safe outputs at once, and so does an emergency stop.
 Rejected: to leave them alone until somebody lets it in, however long. A cell is started from its machines at rest, and
 the first host of it may wait for hours for the others.
@@ -123,6 +124,8 @@ class Peers:
         """When they no longer are, if nobody is known to have them then."""
         self.left_by_rival: set[str] = set()
         """Those of the machines here that the rival which left last was running as well."""
+        self.left_by_unlike: set[str] = set()
+        """The coordinators of machines here that were unlike this host, and are gone."""
         self.of_other_release: set[str] = set()
         """The machines elsewhere that were last met with another bundle or version than the one here."""
         self.hopeless: asyncio.TimerHandle | None = None
@@ -263,10 +266,12 @@ class Peers:
             until = f", or that has been gone for {PARTED_SECONDS:g} s"
         elif unlike := sorted(self._unlike):
             by = all_called(unlike)
-            why, until = (
-                f"{by} may have let another host in with {all_called(self.acts.controllers)}",
-                f", or {by} is gone",
-            )
+            why = f"{by} may have let another host in with {all_called(self.acts.controllers)}"
+            until = f", or that has been gone for {PARTED_SECONDS:g} s"
+        elif self.left_by_unlike:
+            by = all_called(sorted(self.left_by_unlike))
+            why = f"{by}, which may have let another host in, is gone, or a line to it is broken"
+            until = f", or that has been gone for {PARTED_SECONDS:g} s"
         else:
             why = f"another host may have {all_called(self.acts.controllers)}"
             until = f", or nobody says so within {MEET_SECONDS:g} s of its start"
@@ -393,6 +398,8 @@ class Peers:
         self.refused_hosts.discard(tuple(peers))
         if parted := self.acts.controllers.keys() & set(peers):
             self.left_by_rival = parted
+        self.left_by_unlike |= (unlike := self._unlike & set(peers))
+        if parted or unlike:
             self.hands_off_until_seconds = asyncio.get_running_loop().time() + PARTED_SECONDS
         gone = set(peers).difference(*self.refused_hosts)  # some may be those of another host that is there
         for name in gone:

@@ -99,7 +99,7 @@ def test_a_host_whose_coordinator_has_another_bundle_writes_nothing_for_that_may
         mistaken = cell.start(A, digest="of the release before")
         await until(lambda: mistaken.peers.of_other_release, "the coordinator's refusal")
         assert left_alone(mistaken) == [
-            f"the coordinator may have let another host in with 'a': {ALONE}, or the coordinator is gone"
+            f"the coordinator may have let another host in with 'a': {ALONE}, or that has been gone for 30 s"
         ]
         assert (await refusal(cell.tasks[-1])).code == "F5020"
         assert cell.written == []
@@ -108,9 +108,11 @@ def test_a_host_whose_coordinator_has_another_bundle_writes_nothing_for_that_may
     asyncio.run(main())
 
 
-def test_a_host_drives_its_machines_when_a_coordinator_of_another_bundle_is_gone(
+def test_a_host_drives_its_machines_when_a_coordinator_of_another_bundle_has_been_gone_for_long(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr(peers, "PARTED_SECONDS", 5.0)
+
     async def main() -> None:
         cell = Cell(monkeypatch)
         await cell.begin()
@@ -118,7 +120,14 @@ def test_a_host_drives_its_machines_when_a_coordinator_of_another_bundle_is_gone
         alone = cell.start(A, digest="of the release before")
         await until(lambda: alone.peers.of_other_release, "the coordinator's refusal")
         cell.tasks[0].cancel()
+        await until(lambda: alone.peers.left_by_unlike, "the end of that one")
+        gone_at = asyncio.get_running_loop().time()
+        assert left_alone(alone) == [
+            "the coordinator, which may have let another host in, is gone, or a line to it is broken: "
+            f"{ALONE}, or that has been gone for 5 s"
+        ]
         await until(lambda: cell.written, "the safe outputs of its start")
+        assert asyncio.get_running_loop().time() - gone_at > 4.5, "a plug parts two for less"
         assert set(cell.written) == {"out"}
         assert not cell.tasks[-1].done()
         await cell.end_all()
