@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Final, Literal
 
@@ -392,6 +393,11 @@ class _Reading:
             for point in command.write:
                 self.point(command.device, ("commands", place, "write", point), point, Use.WRITE)
             self.values(command.device, ("commands", place, "write"), command.write)
+        for one, other in combinations(self.options, 2):
+            if self.is_one(one, other) and (key := self.options[one].unlike(self.options[other])):
+                message = f"'{other}' stands at the address of '{one}', and has another `{key}`"
+                hint = f"write the same `{key}` for both, so that their points mean the same"
+                self.problem("F5102", ("devices", other), message, hint)
         for path, message, hint in overlaps(self.document, self.is_one):
             self.problem("F5102", path, message, hint)
 
@@ -434,7 +440,7 @@ class _Reading:
         return False
 
     def point(self, device: str, path: TreePath, point: Point, use: Use) -> None:
-        if problem := self.kinds[device].point_problem(point, use):
+        if problem := self.kinds[device].point_problem(point, use) or self.options[device].point_problem(point):
             hint = f"the addresses of `driver: {self.document.devices[device].driver}` are described in docs/drivers.md"
             self.problem("F5102", path, f"{quoted(point)} cannot be a point to {use}: {problem}", hint)
 

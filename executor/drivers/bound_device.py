@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
@@ -89,6 +89,8 @@ class BoundDevice:
         self.writing: Channel | Handshake | None = None
         self.is_ready = asyncio.Event()
         self.was_ready = False
+        self.has_begun = False
+        """Whether it was ready once, or the time is over that its start may take."""
         self.ready_seconds = 0.0
         """When there was a connection first, by the event loop."""
         self.start: asyncio.TimerHandle | None = None
@@ -267,11 +269,8 @@ class BoundDevice:
             for name in {name for point, _ in batch for name in self.image.reads.get(point, ())}:
                 self.unseen.discard(name)
                 self.missed.pop(name, None)
-        if not opened and not self.contacts.are_closed:
-            self.contacts.read(self.image.readings)
-            if self.driver.may_move:  # what was sent before that has waited for it
-                for device in self.driver.devices.values():
-                    device.kept.awake.set()
+        if not opened and self.is_ready.is_set():
+            self._close_contacts()
         self._tell(changes, faults)
         for point, value in batch:
             for channel, key in self.replies.get(point, ()):
@@ -307,8 +306,22 @@ class BoundDevice:
             loop = asyncio.get_running_loop()
             self.ready_seconds = loop.time()
             self.due = loop.call_later(self.document.start_s, self._should_have_shown)
-        self.was_ready = True
+            self.missed = dict.fromkeys(self._good(self.unseen), loop.time() + self.document.grace_s)
+        self.was_ready = self.has_begun = True
         self.is_ready.set()
+        self._close_contacts()
+        self._miss()
+
+    def _close_contacts(self) -> None:
+        """Take for closed what is shown so by a device that is ready: the loss of another one is no emergency."""
+        if not self.contacts.are_closed:
+            self.contacts.read(self.image.readings)
+            if self.driver.may_move:  # what was sent before that has waited for it
+                for device in self.driver.devices.values():
+                    device.kept.awake.set()
+
+    def _good(self, signals: Collection[str]) -> list[str]:
+        return [name for name in sorted(signals) if self.image.readings[name].quality is Quality.GOOD]
 
     def _should_have_shown(self) -> None:
         """Tell what was never shown: where a device tells unasked, a point that is written wrong is not noticed."""
@@ -328,14 +341,16 @@ class BoundDevice:
         """There is no connection, or none any more: also of what was only read by then, nobody knows what it is now."""
         gone = set(self.image.signals) if self.is_ready.is_set() else self.image.signals.keys() - self.unseen
         self.unseen.update(self.image.signals)
+        contacts = gone.intersection(self.contacts.signals())
         if self.is_ready.is_set():
             self.is_ready.clear()
             self._give_up_by_hand(why)
-        if gone:
-            if gone.intersection(self.contacts.signals()):
+            if contacts:
                 self._emergency(self.contacts.lost(why))
-                self.image.lost(why, self.contacts.signals())
+        self.image.lost(why, contacts)  # of them there is no grace
+        if gone:
             self.missed_why = why
+        if gone and self.has_begun:
             lost_seconds = asyncio.get_running_loop().time() + self.document.grace_s
             self.missed = dict.fromkeys(sorted(gone), lost_seconds) | self.missed  # the grace runs from the first loss
             self._miss()
@@ -413,9 +428,9 @@ class BoundDevice:
             self._emergency(f"{open_ones} was not read within {self.document.start_s:g} s")
 
     def _not_met(self, why: str) -> None:
-        """The device was not reached in the time that its start may take: the loss policies hold."""
-        self.missed.clear()
-        self._tell(*self.image.lost(why))
+        """The device was not ready in the time of its start: the loss policies hold for what it does not show."""
+        self.has_begun = True
+        self._tell(*self.image.lost(why, sorted(self.unseen)))
 
     def _miss(self) -> None:
         """Wait for the end of the first grace."""
@@ -438,10 +453,12 @@ class BoundDevice:
             del self.missed[name]
         why = self.missed_why
         if self.is_ready.is_set():
-            over = [name for name in over if self.image.readings[name].quality is Quality.GOOD]
+            over = self._good(over)
             why = f"not shown since it was connected again: {why}"
-        self._tell(*self.image.lost(why, over))
-        self._miss()
+        try:
+            self._tell(*self.image.lost(why, over))
+        finally:
+            self._miss()
 
     def _tell(self, changes: Sequence[Change], faults: Sequence[str]) -> None:
         if self.driver.listener is not None and not self.driver.is_stopped:

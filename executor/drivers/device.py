@@ -96,6 +96,16 @@ class Options(BaseModel):
         """What is equal of two devices that are one, however each is spoken with; by default all options."""
         return self
 
+    def point_problem(self, point: Point) -> str:
+        """What is wrong with a point of a device with these options, which is right for its kind; empty for nothing."""
+        del point
+        return ""
+
+    def unlike(self, other: Options) -> str:
+        """What two devices that are one must have in common so that their points mean the same; empty where they do."""
+        del other
+        return ""
+
 
 def files_of(options: BaseModel) -> Iterator[tuple[tuple[str, ...], Beside]]:
     """The files that options name, with the keys that name them.

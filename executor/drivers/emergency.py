@@ -50,17 +50,18 @@ class Contacts:
         }
 
     def opened(self, batch: Iterable[tuple[Point, Value]]) -> str:
-        """What opens a contact among values that have come in this order, in a sentence; empty where nothing does.
+        """What opens a contact first among values that have come in this order, in a sentence; empty for nothing.
 
         A contact that was open for a moment only is open: the button was pressed.
         """
+        opened = ""
         for point, value in batch:
             for name, one in self.contacts.items():
                 if one.read == point and (bit := as_bit(value)) in {None, one.invert}:
                     self.open_ones.add(name)
                     is_no_bit = f"shows {quoted(value)}, which is neither 0 nor 1"
-                    return f"'{name}' " + (is_no_bit if bit is None else "is open")
-        return ""
+                    opened = opened or f"'{name}' " + (is_no_bit if bit is None else "is open")
+        return opened
 
     def read(self, readings: Mapping[str, Reading]) -> None:
         """What the process image holds by now: which contacts are closed."""

@@ -314,7 +314,8 @@ class Kept:
             self._forget()
             await connection.close()
             if isinstance(connection, Owed):
-                self.owed_until_seconds = asyncio.get_running_loop().time() + connection.owed_seconds
+                until_seconds = asyncio.get_running_loop().time() + connection.owed_seconds
+                self.owed_until_seconds = max(self.owed_until_seconds, until_seconds)
 
     async def _serve(self, connection: Connection) -> None:
         self.has_read = False

@@ -72,6 +72,7 @@ OVERFLOW: Final = 0x480
 
 
 _NAMESPACE_MAX: Final = 0xFFFF
+_NAMESPACE_OF_ALL: Final = "http://opcfoundation.org/UA/"
 
 
 class OpcUaSecurity(BaseModel):
@@ -106,12 +107,23 @@ class OpcUaOptions(Options):
         for index, uri in namespaces.items():
             if not re.fullmatch("[1-9][0-9]{0,4}", index) or int(index) > _NAMESPACE_MAX:
                 refuse(f"'{index}' is no index of a namespace", "write a number from 1 to 65535; 0 is that of OPC UA")
-            if not uri:
-                refuse(f"the namespace of {index} has no name", "write the URI that the server has for it")
+            if uri in {"", _NAMESPACE_OF_ALL}:
+                said = f"is that of {_NAMESPACE_OF_ALL}, which has the index 0" if uri else "has no name"
+                refuse(f"the namespace of {index} {said}", "write the URI that the server has for it")
         twice = [uri for uri, count in Counter(namespaces.values()).items() if count > 1]
         if twice:  # its nodes would have two spellings
             refuse(f"'{twice[0]}' has two indexes", "give each namespace one")
         return namespaces
+
+    def point_problem(self, point: Point) -> str:
+        """An index that means nothing."""
+        found = _NODE.fullmatch(point)
+        is_named = found is None or found[1] is None or not self.namespaces or found[1] in self.namespaces
+        return "" if is_named else f"`namespaces` does not say what the index {found and found[1]} means"
+
+    def unlike(self, other: Options) -> str:
+        """The namespaces, by which the indexes are spelled."""
+        return "" if isinstance(other, OpcUaOptions) and other.namespaces == self.namespaces else "namespaces"
 
     def meant(self) -> dict[int, str]:
         """What each index means."""
@@ -149,7 +161,9 @@ class OpcUaConnection(Stepwise):
         await self.client.connect()
         drop_at_close(self._transport)
         if self.namespaces:
-            there = await self.client.get_namespace_array()
+            there: object = await self.client.get_namespace_array()
+            if not isinstance(there, list):
+                raise LinkError("the server does not say which namespaces it has")
             for index, uri in self.namespaces.items():
                 if uri not in there:
                     raise LinkError(f"the server has no namespace '{uri}'")
@@ -287,8 +301,6 @@ class OpcUaConnection(Stepwise):
 
         found = NodeId.from_string(point)
         if self.namespaces and found.NamespaceIndex:
-            if found.NamespaceIndex not in self.indexes:
-                raise LinkError(f"`namespaces` does not say what the index of '{point}' means")
             found = replace(found, NamespaceIndex=Int16(self.indexes[found.NamespaceIndex]))
         return self.client.get_node(found)
 

@@ -6,6 +6,7 @@ from contextlib import asynccontextmanager, suppress
 from typing import Any
 
 import pytest
+from asyncua.client.client import Client
 
 from firable.executor.drivers.bench import PATIENCE_S, Far
 from firable.executor.drivers.binding import parse_binding
@@ -111,7 +112,12 @@ class TestOpcUa(DriverConformance):
 
 
 @pytest.mark.parametrize("at", [{2: "urn:a", 3: "urn:b"}, {2: "urn:b", 3: "urn:a"}, {4: "urn:a"}])
-def test_a_node_is_found_wherever_the_server_has_its_namespace(at: dict[int, str]) -> None:
+def test_a_node_is_found_wherever_the_server_has_its_namespace(
+    at: dict[int, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def nothing(_: Client) -> None:
+        return None
+
     async def main() -> None:
         own = next(index for index, uri in at.items() if uri == "urn:a")
         points: dict[Point, Value] = {f"ns={index};s=M.{name}": index == own for index in at for name in ("done", "go")}
@@ -124,9 +130,11 @@ def test_a_node_is_found_wherever_the_server_has_its_namespace(at: dict[int, str
             assert list(await connection.read()) == [(done, True)]
             await connection.write(((go, False),))
             assert await asyncio.wait_for(written.get(), PATIENCE_S) == (f"ns={own};s=M.go", False)
-            with pytest.raises(LinkError, match=r"does not say what the index of 'ns=2;s=M\.go' means"):
-                await connection.write((("ns=2;s=M.go", True),))
             await connection.close()
+            with monkeypatch.context() as patch:
+                patch.setattr(Client, "get_namespace_array", nothing)
+                with pytest.raises(LinkError, match="does not say which namespaces it has"):
+                    await KIND.connect(options, Wanted((done,), PATIENCE_S))
             elsewhere = options.model_copy(update={"namespaces": {"7": "urn:c"}})
             with pytest.raises(LinkError, match="the server has no namespace 'urn:c'"):
                 await KIND.connect(elsewhere, Wanted((done,), PATIENCE_S))
@@ -144,6 +152,7 @@ def test_a_node_is_found_wherever_the_server_has_its_namespace(at: dict[int, str
         ("{two: urn:a}", "two"),
         ('{2: ""}', "2"),
         ("{2: urn:a, 3: urn:a}", "'urn:a' has two indexes"),
+        ('{2: "http://opcfoundation.org/UA/"}', "which has the index 0"),
     ],
 )
 def test_namespaces_that_mean_nothing_are_refused_where_they_stand(namespaces: str, told: str) -> None:
@@ -161,6 +170,18 @@ devices:
     assert told in problem.message
     assert problem.span is not None
     assert problem.span.line == 7
+
+
+def test_what_the_namespaces_of_a_binding_leave_open_is_refused() -> None:
+    text = """{firable_bind: 1, cell: n, devices: {
+A: {driver: opcua, url: "opc.tcp://h:4840/", namespaces: {2: urn:a}, safe: {"ns=2;s=x": 0, "i=5": 0, "ns=3;s=x": 0}},
+B: {driver: opcua, url: "opc.tcp://H:4840/", namespaces: {3: urn:a}}}}"""
+    with pytest.raises(InputError) as caught:
+        parse_binding(text)
+    assert [(problem.code, problem.message) for problem in caught.value.diagnostics] == [
+        ("F5102", "'ns=3;s=x' cannot be a point to write: `namespaces` does not say what the index 3 means"),
+        ("F5102", "'B' stands at the address of 'A', and has another `namespaces`"),
+    ]
 
 
 def test_a_server_that_takes_a_connection_and_says_nothing_has_not_answered_in_time() -> None:

@@ -256,25 +256,56 @@ def test_what_this_connection_has_shown_is_good_though_the_grace_ends_before_it_
 
 
 @pytest.mark.parametrize("latched", [False, True])
-def test_a_contact_that_was_read_by_a_connection_that_was_never_ready_is_open_when_that_is_lost(latched: bool) -> None:
-    """Its safe outputs were not confirmed, so nothing was commanded there; other devices may have been."""
+def test_a_contact_is_closed_by_a_device_that_is_ready_and_not_by_a_connection_before(latched: bool) -> None:
+    """Where its safe outputs were not confirmed its loss is no emergency: other devices must not move by it."""
 
-    async def main() -> tuple[BoundDriver, Heard]:
+    async def main() -> tuple[BoundDevice, Heard]:
         driver, heard = BoundDriver(parse_binding(FORGETFUL), (), frozenset(), latched=latched), Heard()
         driver.clock = driver.listener = heard
         device = driver.devices["D"]
         device.read([("door", "1"), ("needed", "1")])
-        assert device.contacts.open_ones == set()
-        device.lost("cut")
-        assert device.contacts.open_ones == {"door"}
+        assert not driver.may_move
+        device.lost("busy")
         device.lost("refused")
+        assert heard.faults == [], "its start may take its time"
         device.read([("shown", "1")])
         device.ready()
         await asyncio.sleep(4)
-        assert device.image.readings["needed"].quality is Quality.BAD
-        return driver, heard
+        return device, heard
 
-    driver, heard = run_in_virtual_time(main())
-    assert not driver.may_move
-    assert heard.emergencies == ([] if latched else ["D: 'door' cannot be read: cut"])
-    assert "D: 'door' is not closed" in driver.against()
+    device, heard = run_in_virtual_time(main())
+    assert device.contacts.open_ones == {"door"}
+    assert device.image.readings["needed"].quality is Quality.BAD
+    assert heard.emergencies == []
+
+
+def test_each_contact_that_opens_is_open_though_another_one_has_opened_with_it() -> None:
+    text = FORGETFUL.replace("emergency_stop: {", "emergency_stop: {gate: {device: D, read: gate}, ")
+    driver, heard = BoundDriver(parse_binding(text), (), frozenset(), latched=True), Heard()
+    driver.clock = driver.listener = heard
+    device = driver.devices["D"]
+
+    async def main() -> tuple[str, ...]:
+        device.read([("door", "1"), ("gate", "1"), ("needed", "1")])
+        device.ready()
+        assert not tuple(driver.against())
+        device.read([("door", "0"), ("gate", "0")])
+        device.read([("door", "1")])
+        return tuple(driver.against())
+
+    assert run_in_virtual_time(main()) == ("D: 'gate' is not closed",)
+
+
+def test_what_a_device_shows_is_not_lost_when_the_time_of_its_start_is_over() -> None:
+    async def main() -> BoundDevice:
+        driver, heard = BoundDriver(parse_binding(FORGETFUL), (), frozenset(), latched=True), Heard()
+        driver.clock = driver.listener = heard
+        device = driver.devices["D"]
+        device.read([("needed", "1")])  # its safe outputs take their time
+        device._not_met("not reached since the start")
+        device.ready()
+        await asyncio.sleep(4)
+        return device
+
+    readings = run_in_virtual_time(main()).image.readings
+    assert (readings["needed"].quality, readings["zero"].quality) == (Quality.GOOD, Quality.BAD)
