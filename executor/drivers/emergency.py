@@ -3,9 +3,9 @@
 A contact is *normally closed* (IEC 60947-5-5): 1 says that the machines may move, and everything else stops them. So a
 wire that breaks, a device that is lost and a value that nobody can read are a button that is pressed, because nobody
 could press it then. There is no time of grace, and no other loss policy. Until each contact has been read as closed, on
-a device that is ready, no machine is commanded; once one of them was not, none is, whatever it shows later: the driver has stopped. The driver
-that follows it is *latched* (`driver.Latched`): it drives the safe outputs and watches the contacts, until all of them
-are closed again and a person has said so. To let the machines move is then another word.
+a device that is ready, no machine is commanded; once one of them was not, none is, whatever it shows later: the driver
+has stopped. The driver that follows it is *latched* (`driver.Latched`): it drives the safe outputs and watches the
+contacts, until all of them are closed again and a person has said so. To let the machines move is then another word.
 
 Every driver looks at the contacts of its own controllers, through its own connections. So the stop needs neither the
 coordinator nor a link between hosts nor any of the other hosts. Rejected: the contact as a sensor of the net, with
