@@ -1,8 +1,8 @@
 """What a device shows, in drawn courses of values, losses and connections, against what a reader of them may believe.
 
 The connection is played: values come, it is ready, it is lost, time passes. Three sentences are checked after each:
-what this connection has shown is good; what it has not, and was lost for longer than the grace, is not; and a contact of the
-emergency stop is closed only if the device is ready and this connection has shown it so, and not open since.
+what this connection has shown is good; what it has not, and was lost for longer than the grace, is not; and a contact
+of the emergency stop is closed only if the device is ready and this connection has shown it so, and not open since.
 """
 
 import asyncio
