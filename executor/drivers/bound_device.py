@@ -306,7 +306,7 @@ class BoundDevice:
             loop = asyncio.get_running_loop()
             self.ready_seconds = loop.time()
             self.due = loop.call_later(self.document.start_s, self._should_have_shown)
-            self.missed = dict.fromkeys(self._good(self.unseen), loop.time() + self.document.grace_s)
+            self.missed = dict.fromkeys(self._good(self.unseen), loop.time() + self.document.grace_s) | self.missed
         self.was_ready = self.has_begun = True
         self.is_ready.set()
         self._close_contacts()

@@ -33,7 +33,8 @@ class Believed:
 
     grace_s: float
     is_ready: bool = False
-    was_ready: bool = False
+    has_begun: bool = False
+    """Whether it was ready once, or the time of its start is over."""
     shown: set[str] = field(default_factory=set)
     missed_since: dict[str, float] = field(default_factory=dict)
     closed: dict[str, bool] = field(default_factory=dict)
@@ -47,9 +48,9 @@ class Believed:
                 self.missed_since.pop(signal, None)
 
     def ready(self, now: float) -> None:
-        if not self.was_ready:  # until then the start has its own time
+        if not self.has_begun:  # until then the start has its own time
             self.missed_since = dict.fromkeys(self.missed_since, now)
-        self.is_ready = self.was_ready = True
+        self.is_ready = self.has_begun = True
 
     def lost(self, now: float) -> None:
         for signal in POINTS if self.is_ready else set(self.shown):
@@ -60,7 +61,7 @@ class Believed:
 
     def is_over(self, signal: str, now: float) -> bool:
         since = self.missed_since.get(signal)
-        return self.was_ready and since is not None and now > since + self.grace_s + 1e-3
+        return self.has_begun and since is not None and now > since + self.grace_s + 1e-3
 
 
 @pytest.mark.seeds
@@ -72,7 +73,7 @@ def test_what_a_device_has_shown_is_good_and_what_is_lost_for_long_is_not() -> N
         driver.clock = driver.listener = heard
         device, loop = driver.devices["D"], asyncio.get_running_loop()
         for _ in range(120):
-            match drawn.choice(("read", "read", "ready", "lost", "lost", "pass", "pass", "pass")):
+            match drawn.choice(("read", "read", "ready", "lost", "lost", "late", "pass", "pass", "pass")):
                 case "read":
                     points = drawn.sample([*dict.fromkeys(POINTS.values()), *CONTACTS], drawn.randint(1, 4))
                     batch = [(point, drawn.choice("1110") if point in CONTACTS else "1") for point in points]
@@ -81,6 +82,9 @@ def test_what_a_device_has_shown_is_good_and_what_is_lost_for_long_is_not() -> N
                 case "ready" if not believed.is_ready:
                     believed.ready(loop.time())
                     device.ready()
+                case "late" if not believed.has_begun:
+                    believed.has_begun = True
+                    device._not_met("not reached since the start")
                 case "lost":
                     believed.lost(loop.time())
                     for _ in range(drawn.randint(1, 2)):  # it may be told twice
