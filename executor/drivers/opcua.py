@@ -138,11 +138,10 @@ class OpcUaOptions(Options):
 class OpcUaConnection(Stepwise):
     """A session with a server, and a subscription to the nodes that are read."""
 
-    def __init__(self, client: Client, wanted: Wanted, namespaces: Mapping[int, str]) -> None:
+    def __init__(self, client: Client, wanted: Wanted) -> None:
         self.client = client
-        self.namespaces = namespaces
         self.indexes: dict[int, int] = {}
-        """Where the server has each of them."""
+        """Where the server has the namespaces that the indexes of points mean, if it is said what they mean."""
         self.wanted = wanted
         self.told: asyncio.Queue[tuple[Point, Value] | Exception] = asyncio.Queue()
         self.points: dict[str, Point] = {}
@@ -151,7 +150,7 @@ class OpcUaConnection(Stepwise):
         self.looking: asyncio.TimerHandle | None = None
         """When it is looked next whether the server still tells of the subscription."""
 
-    async def open(self, every_s: float) -> None:
+    async def open(self, every_s: float, namespaces: Mapping[int, str]) -> None:
         """Connect, and subscribe to what is wanted."""
         from asyncua.common.subscription import Subscription
         from asyncua.ua.uaprotocol_auto import CreateSubscriptionParameters, ModifySubscriptionParameters
@@ -160,11 +159,11 @@ class OpcUaConnection(Stepwise):
         self.client.connection_lost_callback = self._lost
         await self.client.connect()
         drop_at_close(self._transport)
-        if self.namespaces:
+        if namespaces:
             there: object = await self.client.get_namespace_array()
             if not isinstance(there, list):
                 raise LinkError("the server does not say which namespaces it has")
-            for index, uri in self.namespaces.items():
+            for index, uri in namespaces.items():
                 if uri not in there:
                     raise LinkError(f"the server has no namespace '{uri}'")
                 self.indexes[index] = there.index(uri)
@@ -300,7 +299,7 @@ class OpcUaConnection(Stepwise):
         from asyncua.ua.uatypes import Int16, NodeId
 
         found = NodeId.from_string(point)
-        if self.namespaces and found.NamespaceIndex:
+        if self.indexes and found.NamespaceIndex:
             found = replace(found, NamespaceIndex=Int16(self.indexes[found.NamespaceIndex]))
         return self.client.get_node(found)
 
@@ -400,11 +399,11 @@ class OpcUa:
         if options.user is not None:
             client.set_user(options.user)
             client.set_password(options.password or "")
-        connection = OpcUaConnection(client, wanted, options.meant())
+        connection = OpcUaConnection(client, wanted)
         try:
             if options.security is not None:
                 await _secure(client, options.security)
-            await connection.open(options.every_s)
+            await connection.open(options.every_s, options.meant())
         except (uaerrors.BadUserAccessDenied, uaerrors.BadIdentityTokenRejected, uaerrors.BadIdentityTokenInvalid):
             await connection.close()
             raise not_let_in(options.url, options.user, options.password) from None
