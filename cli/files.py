@@ -114,7 +114,9 @@ def is_folder(argument: str) -> bool:
 
 def journal_files(journal: str) -> tuple[str, ...]:
     """The files of a journal, those that SQLite makes beside it among them."""
-    return tuple(f"{journal}{suffix}" for suffix in ("", ".cell", ".generation", "-wal", "-shm", "-journal"))
+    return tuple(
+        f"{journal}{suffix}" for suffix in ("", ".cell", ".generation", ".taken-over", "-wal", "-shm", "-journal")
+    )
 
 
 def stem(argument: str) -> str:

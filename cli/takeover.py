@@ -59,17 +59,19 @@ def takeover(
     """Take the marking of a stopped cell over from bundle OLD to bundle NEW, by the names of its places.
 
     It is done only in a marking that NEW can reach, because NEW was proved for those alone; with no vote open, and with
-    the same command in every place that has a token. The journals of OLD are left as they are. `firable run NEW
-    --journal` then goes on: held, until the machines are asked where they are and the operator resumes.
+    the same command in every place that has a token. The journals of OLD are left as they are, and OLD is not run on
+    with them: a file .taken-over beside each says so. `firable run NEW --journal` then goes on: held, until the
+    machines are asked where they are and the operator resumes.
     """
     from firable.executor.journal.memory import HOSTS, remembered
-    from firable.executor.journal.sqlite_journal import SqliteJournal, machines_of
+    from firable.executor.journal.sqlite_journal import SqliteJournal, machines_of, mark_of
     from firable.executor.journal.takeover import dealt_out, take_over
     from firable.executor.operating.dispatch import TAKEN
     from firable.executor.operating.hosting import machines_of as hosted
     from firable.executor.operating.running import load
     from firable.executor.protocol.deciders import TOP, coordinators
     from firable.nets.bundle import read_bundle
+    from firable.nets.source import printable
     from firable.nets.writing import write_whole
 
     if len(into) != len(journals):
@@ -101,7 +103,12 @@ def takeover(
         _demand_reachable(before.net, after.net, moved.marking, budget(max_markings, max_memory, max_seconds))
         targets = dict(zip(journals, into, strict=True))
         written = {targets[file]: names for file, names in dealt.items() if names}
-        with _removed_if_it_fails(written):
+        marks = [str(mark_of(file)) for file in journals]
+        with _removed_if_it_fails([*marks, *(name for file in written for name in journal_files(file))]):
+            # First of all, so that however this ends the old bundle is not run on beside the new one.
+            for file, mark in zip(journals, marks, strict=True):
+                where = f"in {printable(targets[file])}" if dealt[file] else "without the machines of this host"
+                write_whole(mark, f"'{after.net.name}' goes on {where}\n")
             if len(journals) == 1 and Path(f"{journals[0]}.cell").is_file():  # the simulated cell, if there is one
                 write_whole(f"{into[0]}.cell", Path(f"{journals[0]}.cell").read_bytes())
             _write(written, after.digest, moved, {targets[file]: of for file, of in taken.items()})
@@ -122,11 +129,10 @@ def takeover(
 
 
 @contextmanager
-def _removed_if_it_fails(journals: Collection[str]) -> Iterator[None]:
-    """Leave none of these journals, where none stood, unless all are there: part of a cell must not be started."""
+def _removed_if_it_fails(names: Collection[str]) -> Iterator[None]:
+    """Leave none of these files, where none stood, unless all is done: part of a cell must not be started."""
     from firable.nets.writing import stands
 
-    names = [f"{file}{end}" for file in journals for end in ("", ".generation", ".cell")]
     new = [name for name in names if not stands(name)]
     try:
         yield

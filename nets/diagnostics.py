@@ -148,6 +148,7 @@ CODES: Final[dict[str, str]] = {
     "F5033": "the journal is in use",
     "F5034": "the journal cannot be used",
     "F5035": "the simulated cell of another run",
+    "F5036": "a journal from which a new bundle goes on",
     "F5050": "a run that a new bundle may not go on from",
     "F5051": "a marking that the new bundle does not reach",
     "F5060": "an operator's endpoint that is open to everybody",

@@ -13,8 +13,9 @@ time without a word; the cell would then be commanded again what it has done. So
   it was copied alone, and may have lost anything.
 
 A journal is of one bundle and of certain machines, which its header names; another one's is refused (F5031), as is a
-damaged one (F5032), one that another process has open (F5033), and one that cannot be written (F5034). The file is
-locked as long as it is open, and the lock ends with the process, however it ends.
+damaged one (F5032), one that another process has open (F5033), one that cannot be written (F5034), and one that a new
+bundle goes on from (F5036), as a file beside it tells: a start script that was not changed would run the old bundle
+beside the new one. The journal is locked as long as it is open, and the lock ends with the process, however it ends.
 
 Rejected: a log file of our own. It would be short, and its recovery, rotation, locking and syncing would be the least
 tested code on the way of every command.
@@ -53,7 +54,7 @@ class SqliteJournal:
     """The journal in the file `path`, of the machines `machines` of the bundle with this digest; made if there is none.
 
     Raises `InputError` F5031 for the journal of another bundle or of other machines, F5032 for a damaged one, F5033 for
-    one in use, F5034 where the file cannot be read or written.
+    one in use, F5034 where the file cannot be read or written, F5036 for one that was taken over.
     """
 
     def __init__(self, path: Path | str, digest: str, machines: Iterable[str]) -> None:
@@ -72,6 +73,7 @@ class SqliteJournal:
         self.failed: InputError | None = None
         self.witness_descriptor = -1
         with _failures(self.path, "opened"):
+            _refuse_taken_over(self.path)
             is_new = not self.path.exists() or not self.path.stat().st_size
             # One thread at a time uses it, and not always the same.
             self.connection = sqlite3.connect(self.path, timeout=0, isolation_level=None, check_same_thread=False)
@@ -234,6 +236,11 @@ def witness_of(path: Path | str) -> Path:
     return Path(f"{Path(path)}.generation")
 
 
+def mark_of(path: Path | str) -> Path:
+    """The file beside a journal that says, in one line, which bundle goes on from it, and where."""
+    return Path(f"{Path(path)}.taken-over")
+
+
 def machines_of(path: Path | str) -> tuple[str, ...]:
     """The machines that a journal is of, as its header names them; nothing else of it is looked at.
 
@@ -248,6 +255,14 @@ def machines_of(path: Path | str) -> tuple[str, ...]:
         if not isinstance(names, list):
             _damaged(path, "its header is missing")
     return tuple(map(str, names))
+
+
+def _refuse_taken_over(path: Path) -> None:
+    mark = mark_of(path)
+    if mark.exists():
+        told = printable(mark.read_text("utf-8", "replace").strip())
+        message = f"{printable(str(path))}: the journal was taken over: {told}"
+        raise InputError([Diagnostic("F5036", message, "run that one; both would command the same machines")])
 
 
 _NOTHING: Final = "nothing stands in it"

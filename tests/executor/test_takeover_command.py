@@ -39,6 +39,36 @@ def test_the_command_writes_a_journal_that_the_new_bundle_opens(
     assert joint_marking(read.decomposition, kept) == {"robot.worked_out", "table.full"}
 
 
+def test_the_old_bundle_is_not_run_on_beside_the_new_one_and_goes_on_by_a_takeover_back(
+    bundles: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    old, new = map(str, bundles)
+    before = str(journal(tmp_path / "old.journal", bundles[0], {"robot.worked_out", "table.full"}))
+    after, again = str(tmp_path / "new.journal"), str(tmp_path / "again.journal")
+    assert main(["takeover", old, new, "--journal", before, "--into", after]) == 0
+    refused = f"error[F5036]: {before}: the journal was taken over: 'cell' goes on in {after}"
+    capsys.readouterr()
+    assert main(["takeover", old, new, "--journal", before, "--into", again]) == 2
+    assert refused in capsys.readouterr().err
+    assert not Path(again).exists()
+    assert main(["takeover", new, old, "--journal", after, "--into", again]) == 0
+    assert main(["takeover", new, old, "--journal", after, "--into", f"{again}.2"]) == 2
+    assert f"'cell' goes on in {again}" in capsys.readouterr().err
+
+
+def test_a_journal_that_was_moved_away_from_its_mark_is_not_begun_anew(
+    bundles: tuple[Path, Path], tmp_path: Path
+) -> None:
+    before = journal(tmp_path / "old.journal", bundles[0], {"robot.worked_out", "table.full"})
+    command = ["takeover", *map(str, bundles), "--journal", str(before), "--into", str(tmp_path / "new.journal")]
+    assert main(command) == 0
+    for name in ("old.journal", "old.journal.generation"):
+        (tmp_path / name).unlink()
+    with pytest.raises(InputError, match="F5036"):
+        SqliteJournal(before, read_bundle(bundles[0]).digest, (COORDINATOR, "line", "robot", "table"))
+    assert not before.exists()
+
+
 def test_a_marking_that_the_new_net_never_reaches_is_refused_and_nothing_written(
     bundles: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -47,6 +47,7 @@ def test_a_run_on_the_simulated_cell_goes_on_under_the_new_bundle(
     assert main(["takeover", str(old), str(new), "--journal", before, "--into", after]) == 0
     assert main(["run", str(new), *plant, "--journal", after]) == 3  # held
     assert main(["run", str(new), *plant, "--journal", after, "--resume"]) == 0
+    Path(f"{before}.taken-over").unlink()  # as if the new journal were gone
     assert main(["takeover", str(old), str(renamed), "--journal", before, "--into", other]) == 0
     assert main(["run", str(renamed), *plant, "--journal", other]) == 2
     assert "which is no place" in capsys.readouterr().err
