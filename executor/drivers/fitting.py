@@ -5,6 +5,8 @@ like a machine that is slow. So both are refused before anything is connected, a
 
 So are two commands that are written alike, such as a stop that was copied from the line of a start and not edited: the
 machine would do the one for the other. Only machine and word are compared: a gripper may close in one way everywhere.
+And so is a channel with commands of two machines of two controllers: it is for one machine, which does one thing at a
+time, and these may be at work at once. An arm and its gripper, of one controller, may be one program's.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ from firable.nets.net import Command, Net, Place, SignalKind
 
 
 def misfits(binding: Binding, net: Net) -> tuple[Diagnostic, ...]:
-    """Where a binding does not fit a net (F5101), or has two commands look alike to a machine (F5102)."""
+    """Where a binding does not fit a net (F5101), or gives a channel commands of two machines, or alike (F5102)."""
     return tuple(_misfits(binding, net))
 
 
@@ -65,7 +67,9 @@ def _misfits(binding: Binding, net: Net) -> Iterator[Diagnostic]:
             )
         else:
             yield from _unanswered(binding, place)
-    yield from _alike(binding, [place for place in places.values() if place.name in document.commands])
+    bound = [place for place in places.values() if place.name in document.commands]
+    yield from _alike(binding, bound)
+    yield from _crowded(binding, bound)
 
 
 def _unanswered(binding: Binding, place: Place) -> Iterator[Diagnostic]:
@@ -95,6 +99,21 @@ def _alike(binding: Binding, places: Iterable[Place]) -> Iterator[Diagnostic]:
         hint = "the machine cannot tell them apart: write what is meant by each, or give them one word in the net"
         key = ("write",) if bound.write else ()
         yield binding.problem("F5102", ("commands", place.name, *key), message, hint)
+
+
+def _crowded(binding: Binding, places: Iterable[Place]) -> Iterator[Diagnostic]:
+    """Commands of another machine, from another controller, than the first that is given by their channel."""
+    given: dict[tuple[str, str], Place] = {}
+    for place in places:
+        bound = binding.document.commands[place.name]
+        first = given.setdefault((bound.device, bound.channel), place)
+        if first.command is None or place.command is None or place.owner == first.owner:
+            continue
+        if place.command.machine != first.command.machine:
+            one, other = first.command.machine, place.command.machine
+            message = f"'{bound.channel}' has commands of '{one}', such as '{first.name}', and here of '{other}'"
+            hint = "a channel is for one machine, which does one thing at a time: name the channel of this one"
+            yield binding.problem("F5102", ("commands", place.name, "channel"), message, hint)
 
 
 def _word(command: Command) -> tuple[str, str]:

@@ -340,14 +340,14 @@ def tls_context(certificate: str, key: str, client_authority: str | None) -> ssl
 
 
 def _name_of(request: web.Request, endpoint: Endpoint) -> str | None:
-    """Who comes: the common name of the certificate, or "token"; None where neither is shown."""
+    """Who comes: the common name of the certificate, or an operator for who has the token; None where neither is shown."""
     if endpoint.demands_certificates and request.transport is not None:
         certificate = request.transport.get_extra_info("peercert") or {}
         names = [value for rdn in certificate.get("subject", ()) for key, value in rdn if key == "commonName"]
         return names[0] if names else "a certificate without a name"
     scheme, _, shown = request.headers.get("Authorization", "").partition(" ")
     if scheme == "Bearer" and secrets.compare_digest(shown.encode(errors="surrogateescape"), endpoint.token.encode()):
-        return "token"
+        return "an operator"
     return None
 
 

@@ -84,7 +84,9 @@ class Log:
     def seen(self, event: Event) -> None:
         """An event of the trace; votes and applications stand there alone."""
         if isinstance(event, Noted) and event.note not in (VOTED, STANDS, APPLIED):
-            self._tell(LEVELS.get(event.note, logging.INFO), event.note, {"at": event.at_seconds, **event.data})
+            self._tell(
+                LEVELS.get(event.note, logging.INFO), event.note, {"at": round(event.at_seconds, 6), **event.data}
+            )
 
     def ended(self, situation: Situation) -> None:
         """The host has ended; where nobody wanted that, what waited for what stands there."""

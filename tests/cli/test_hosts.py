@@ -349,4 +349,4 @@ def test_an_operator_stops_the_machines_of_one_host_although_its_coordinator_nev
         process.wait()
     assert process.returncode == 3, "whether it would have left nothing open is not known"
     run = json.loads(out)["reports"][0]["run"]
-    assert (run["state"], run["message"], run["never_met"]) == ("stopped", "emergency stop: by token", [""])
+    assert (run["state"], run["message"], run["never_met"]) == ("stopped", "emergency stop: by an operator", [""])

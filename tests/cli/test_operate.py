@@ -90,7 +90,7 @@ def test_an_operator_pauses_steps_resumes_and_stops_a_run_at_once(
     assert "firable_firings_total" in operate(address, "metrics", folder, capsys)
     operate(address, "resume", folder, capsys)
     operate(address, "emergency-stop", folder, capsys)
-    until_told(address, "latched: emergency stop: by token", folder, capsys)
+    until_told(address, "latched: emergency stop: by an operator", folder, capsys)
     for command in ("resume", "step", "pause", "stop-at-end"):
         told = operate(address, command, folder, capsys, code=1)
         assert told.startswith("refused: the run is latched, and ")
@@ -98,7 +98,7 @@ def test_an_operator_pauses_steps_resumes_and_stops_a_run_at_once(
     out, _ = process.communicate(timeout=PATIENCE_SECONDS)
     assert process.returncode == 3, "whether all workpieces go through is not known"
     report = json.loads(out)["reports"][0]["run"]
-    assert report["message"] == "emergency stop: by token"
+    assert report["message"] == "emergency stop: by an operator"
     trace = read_trace(folder / "run.trace")
     notes = [event for event in trace.events if isinstance(event, Noted)]
     assert {note.data.get("what") for note in notes} >= {"pause", "step", "resume", "emergency-stop"}

@@ -101,7 +101,7 @@ def test_an_emergency_stop_sends_no_command_any_more(chromium: Browser, bundle: 
     ):
         expect(page.locator(".events .fired").first).to_be_attached()
         page.get_by_role("button", name="Emergency stop").click()
-        expect(page.get_by_role("alert").or_(page.locator(".banner"))).to_contain_text("emergency stop: by token")
+        expect(page.get_by_role("alert").or_(page.locator(".banner"))).to_contain_text("emergency stop: by an operator")
         state(page, "latched")
         expect(page.get_by_role("button", name="Pause")).to_be_disabled()
         page.get_by_role("button", name="Reset").click()
@@ -131,7 +131,7 @@ def test_a_lost_connection_is_told_and_what_is_shown_is_marked_as_old(chromium: 
     ):
         state(page, "waiting")
         page.get_by_role("button", name="Emergency stop").click()
-        expect(page.locator(".banner")).to_contain_text("emergency stop: by token")
+        expect(page.locator(".banner")).to_contain_text("emergency stop: by an operator")
         process.send_signal(signal.SIGSTOP)  # the host hangs: its sockets stay open, and nothing comes
         expect(page.get_by_role("alert")).to_contain_text("The connection is lost since")
         expect(page.get_by_role("button", name="Emergency stop")).to_be_disabled()
@@ -139,7 +139,7 @@ def test_a_lost_connection_is_told_and_what_is_shown_is_marked_as_old(chromium: 
         process.send_signal(signal.SIGCONT)
         expect(page.locator("body")).not_to_contain_class("old")
         expect(page.get_by_role("button", name="Emergency stop")).to_be_enabled()
-        expect(page.locator(".banner")).to_contain_text("emergency stop: by token")
+        expect(page.locator(".banner")).to_contain_text("emergency stop: by an operator")
 
 
 @needs_browser

@@ -101,18 +101,18 @@ def test_every_command_reaches_the_run_with_the_name_of_who_gave_it() -> None:
                 assert told.get("fired") == ("G1" if command == "step" else None)
 
     assert with_endpoint(Endpoint("127.0.0.1", 0, TOKEN), ask) == [
-        "token: pause",
+        "an operator: pause",
         "pause",
-        "token: step",
+        "an operator: step",
         "step",
-        "token: resume",
+        "an operator: resume",
         "resume",
-        "token: stop-at-end",
+        "an operator: stop-at-end",
         "stop at end",
-        "token: stop",
+        "an operator: stop",
         "stop",
-        "emergency stop by token",
-        "token: emergency-stop",
+        "emergency stop by an operator",
+        "an operator: emergency-stop",
     ]
 
 
@@ -139,7 +139,11 @@ def test_a_command_that_does_nothing_is_refused_in_the_words_of_the_situation(
             assert told["refused"] == [f"the run is waiting, and {why}"]
             assert told["state"] == "waiting"
             assert told.get("fired") is None
-        assert run.log == [f"token: {command}", written, f"token: {command} refused: the run is waiting, and {why}"]
+        assert run.log == [
+            f"an operator: {command}",
+            written,
+            f"an operator: {command} refused: the run is waiting, and {why}",
+        ]
 
     asyncio.run(main())
 
@@ -156,16 +160,16 @@ def test_a_reset_and_what_is_said_of_a_command_are_answered_by_what_is_against_t
                 assert (await answer.json())["refused"] == refused
 
     log = with_endpoint(Endpoint("127.0.0.1", 0, TOKEN), ask)
-    assert [line for line in log if "token" not in line] == [
+    assert [line for line in log if "an operator" not in line] == [
         "reset",
         "say robot.grasp NOT_RECEIVED",
         "say robot.free DONE",
     ]
-    assert log[0] == "token: reset"
+    assert log[0] == "an operator: reset"
     assert [line for line in log if "refused" in line] == [
-        "token: reset refused: D: 'button' is not closed",
-        "token: say robot.free=done refused: nobody asks after robot.free",
-        "token: say robot.grasp=unknown refused: say done, working, not received",
+        "an operator: reset refused: D: 'button' is not closed",
+        "an operator: say robot.free=done refused: nobody asks after robot.free",
+        "an operator: say robot.grasp=unknown refused: say done, working, not received",
     ]
 
 

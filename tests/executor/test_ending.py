@@ -124,7 +124,7 @@ def test_an_error_ends_the_run_and_stops_the_machines_even_where_its_caller_swal
 
 async def stepped(run: Host) -> str | None:
     """As the endpoint of an operator does it."""
-    run.commanded("step", "token")
+    run.commanded("step", "an operator")
     return await run.step()
 
 

@@ -339,6 +339,27 @@ def test_commands_of_different_machines_that_are_written_alike_are_refused_and_o
         assert [problem.code for problem in misfits(binding, net)] == (["F5102"] if is_refused else [])
 
 
+@pytest.mark.parametrize(
+    ("owner", "machine", "is_refused"), [("B", "N", True), ("B", "M", False), ("M", "N", False), ("M", "M", False)]
+)
+def test_a_channel_is_for_one_machine_where_two_controllers_may_give_it_commands_at_once(
+    owner: str, machine: str, is_refused: bool
+) -> None:
+    given = f"{{start: x, places: {{x: , y: {{send: {{machine: {machine}, command: RUN}}}}}}}}"
+    text = NET_TEXT.replace("transitions:", f"  B: {given}\ntransitions:")
+    if owner == "M":
+        text = text.replace(given, "{start: x, places: {x: , y: }}").replace(
+            "stop: {send: {machine: M, command: STOP}}", f"stop: {{send: {{machine: {machine}, command: STOP}}}}"
+        )
+    net = parse_net(f"{text}  t4: {{from: B.x, to: B.y}}\n  t5: {{from: B.y, to: B.x}}\n")
+    more = "" if owner == "M" else "  B.y: {device: plc, channel: M, write: {holding 2: 9}}\n"
+    found = misfits(parse_binding(GOOD + more, "c.bind.yaml"), net)
+    assert [(one.code, one.message) for one in found] == (
+        [("F5102", "'M' has commands of 'M', such as 'M.move', and here of 'N'")] if is_refused else []
+    )
+    assert [one.span.line for one in found if one.span is not None] == [19] * is_refused
+
+
 STOP = "emergency_stop:\n  door: {device: plc, read: discrete 3}\nsignals:"
 
 
