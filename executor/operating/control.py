@@ -340,7 +340,7 @@ def tls_context(certificate: str, key: str, client_authority: str | None) -> ssl
 
 
 def _name_of(request: web.Request, endpoint: Endpoint) -> str | None:
-    """Who comes: the common name of the certificate, or an operator for who has the token; None where neither is shown."""
+    """Who comes: the common name of the certificate, or "an operator" by the token; None where neither is shown."""
     if endpoint.demands_certificates and request.transport is not None:
         certificate = request.transport.get_extra_info("peercert") or {}
         names = [value for rdn in certificate.get("subject", ()) for key, value in rdn if key == "commonName"]
