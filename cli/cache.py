@@ -1,10 +1,10 @@
 """What `check` found before: reports kept by the content of the net, so that a net that has not changed is not checked.
 
-The key is a hash over the net without its descriptions, over all that the caller asked for, and over the program
-itself (the size and time of each of its files), so that an answer never outlives the code that gave it. Comments,
-layout and the bindings to hardware are in none of these: changing them keeps the answer. Only decided reports are
-kept: an unknown may be known with another budget, or on a faster day; and none that Ctrl-C ended, of which figures or
-cures may be missing.
+The key is a hash over the net without its descriptions, over all that the caller asked for, over the program itself
+(the size and time of each of its files), and over the versions of the libraries that take part in an answer, so that
+an answer never outlives the code that gave it. Comments, layout and the bindings to hardware are in none of these:
+changing them keeps the answer. Only decided reports are kept: an unknown may be known with another budget, or on a
+faster day; and none that Ctrl-C ended, of which figures or cures may be missing.
 
 What is read back carries a checksum, and what does not fit it is no answer: it is computed anew. The cache is for the
 one who runs `check` again and again; a bundle is never made from it.
@@ -18,6 +18,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 
 VARIABLE: Final = "FIRABLE_CACHE"
 """Names the folder of the cache; empty switches it off."""
+LIBRARIES: Final = ("numpy", "networkx", "highspy", "z3-solver")
+"""What takes part in answers, as it is called where it comes from."""
 _ENTRIES_MAX: Final = 1000
 _INTERRUPTED: Final = "interrupted"  # so the course of a report tells of Ctrl-C
 
@@ -108,8 +111,19 @@ def key_of(net: Net, asked: Mapping[str, Any]) -> str:
     """
     from firable.nets.interchange import net_digest
 
-    content = [net_digest(net), dict(asked), _program()]
+    content = [net_digest(net), dict(asked), _program(), _libraries()]
     return _sha256(json.dumps(content, sort_keys=True))
+
+
+def _libraries() -> list[str]:
+    """The libraries, each with its version; without one where it came otherwise than as a package."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    found = []
+    for name in LIBRARIES:
+        with suppress(PackageNotFoundError):
+            found.append(f"{name} {version(name)}")
+    return found
 
 
 def _program() -> list[list[Any]]:

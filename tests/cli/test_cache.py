@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 from dataclasses import dataclass, replace
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from typing import Any
 
@@ -119,6 +120,22 @@ def test_the_answer_goes_by_the_modules_of_the_program_and_by_nothing_that_lies_
     for module in ("analysis/spaces/__init__.py", "analysis/_other.pyd", "cli/main.py", "nets/__init__.py"):
         before, last = touch(module), before
         assert before != last
+
+
+def test_the_answer_of_another_solver_is_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    versions = {"z3-solver": "4.13.0", "numpy": "2.1"}
+
+    def version(name: str) -> str:
+        try:
+            return versions[name]
+        except KeyError:
+            raise PackageNotFoundError(name) from None  # it came otherwise than as a package
+
+    monkeypatch.setattr("importlib.metadata.version", version)
+    before = key_of(catalogue_net("one_robot"), {})
+    assert key_of(catalogue_net("one_robot"), {}) == before
+    versions["z3-solver"] = "4.14.0"
+    assert key_of(catalogue_net("one_robot"), {}) != before
 
 
 def test_a_damaged_entry_is_no_answer(folder: Path, explored: list[str], capsys: pytest.CaptureFixture[str]) -> None:
