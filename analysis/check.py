@@ -42,7 +42,7 @@ from firable.analysis.methods import (
     Method,
     Technique,
 )
-from firable.analysis.question import Question, unknown
+from firable.analysis.question import LARGER, Question, unknown
 from firable.analysis.race import SLICES_SECONDS, Contestant, race
 from firable.analysis.report import CheckReport, report_on
 from firable.analysis.settling import Lanes, Settling
@@ -63,6 +63,7 @@ ALONE_SECONDS: Final = 60.0
 """How long a technique that is named has for each question, where no time is given."""
 ALONE_STEPS: Final = 50
 """How long runs it unrolls then: a solver takes longer for each further step, and comes to no end by itself."""
+_INTERRUPTED: Final = "interrupted"
 _ALONE_SECONDS: Final = 0.1
 """How long techniques that hold all markings are alone, before others begin beside them."""
 _SPACES_SHARE: Final = 0.6  # of the time, for techniques that hold all markings
@@ -110,12 +111,14 @@ def check(
     if budget.seconds is not None:
         deadline = Deadline.after(budget.seconds, interrupted)
     one = _Check(net, discipline, budget, deadline, interrupted, tuple(queries), progress, tell)
-    if method is Method.EXPLICIT or (method is Method.AUTO and discipline is Discipline.STEP):
-        return one.explicitly()
-    if discipline is Discipline.STEP:
+    if discipline is Discipline.STEP and method not in {Method.EXPLICIT, Method.AUTO}:
         message = f"the method '{method}' knows no synchronous steps"
         raise InputError([Diagnostic("F3006", message, "leave out --method, or name `explicit`")])
-    return one.automatically() if method is Method.AUTO else one.by(method)
+    if method is Method.EXPLICIT or discipline is Discipline.STEP:
+        report = one.explicitly()
+    else:
+        report = one.automatically() if method is Method.AUTO else one.by(method)
+    return _left_off(report) if _INTERRUPTED in report.course else report
 
 
 @dataclass(frozen=True)
@@ -239,11 +242,11 @@ class _Check:
             if self.interrupted.is_set():
                 raise
             self.interrupted.set()
-            return _told(report_on(space, self.queries, known), ["interrupted"])
+            return _told(report_on(space, self.queries, known), [_INTERRUPTED])
 
     def _explored(self, graph: ReachabilityGraph) -> CheckReport:
         """The report on a graph, and whether Ctrl-C ended the graph: then its figures are not those of the net."""
-        ended = ["interrupted"] if graph.engine.reason == "interrupted" else []
+        ended = [_INTERRUPTED] if graph.engine.reason == "interrupted" else []
         return _told(self._report(graph), [f"explored: {_size(graph)}", *ended])
 
     def _explore(self, budget: Budget, threads: int = 1) -> ReachabilityGraph:
@@ -277,7 +280,7 @@ class _Check:
                     course.append(f"{outcome.winner} was the first to hold all markings: {_size(space)}")
             except KeyboardInterrupt:  # nothing else is begun, and what is known is reported
                 self.interrupted.set()
-                course.append("interrupted")
+                course.append(_INTERRUPTED)
             finally:
                 enough.set()
         begun.result()
@@ -388,6 +391,13 @@ def _size(space: StateSpace[Any]) -> str:
     edges = "edges not counted" if space.n_edges is None else f"{spelled(space.n_edges)} edges"
     size = f"{spelled(space.n_markings)} markings, {edges}"
     return size if space.complete else f"{size}, which are not all ({space.bound})"
+
+
+def _left_off(report: CheckReport) -> CheckReport:
+    """A report that Ctrl-C has ended: what is unknown by that is no matter of the budget."""
+    hint = "ask again, and let it come to its end"
+    told = (replace(verdict, hint=hint) if verdict.hint == LARGER else verdict for verdict in report.verdicts)
+    return replace(report, verdicts=tuple(told))
 
 
 def _told(report: CheckReport, course: Sequence[str]) -> CheckReport:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Any
+from typing import Any, Final
 
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
 from firable.analysis.spaces.space import StateSpace
@@ -19,6 +19,8 @@ from firable.nets.verdict import Cost, Status, Verdict, Weight, Witness, spelled
 from firable.semantics.trace import Discipline
 
 _STATUS = {True: Status.PROVED, False: Status.VIOLATED, None: Status.UNKNOWN}
+LARGER: Final = "give it a larger budget of markings, memory or time"
+"""What helps where a budget has ended a search."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +69,7 @@ class Question:
             answer = find()
         except (IncompleteGraph, BudgetExceeded) as error:
             bound = space.bound or f"{spelled(space.n_markings)} markings: {error}"
-            answer = unknown(bound, "give it a larger budget of markings, memory or time", "F3004")
+            answer = unknown(bound, LARGER, "F3004")
         seconds = (space.cost.seconds or 0.0) + perf_counter() - start
         cost = Cost(space.n_markings, space.n_edges, seconds)
         return self.settle(answer, self.method or space.method, space.discipline, cost)

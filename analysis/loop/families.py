@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from firable.analysis.check import check
 from firable.analysis.goal import Limits
-from firable.analysis.question import listed
+from firable.analysis.question import LARGER, listed
 from firable.analysis.report import CheckReport
 from firable.analysis.spaces.reachability import Budget
 from firable.nets.formula import And, Constant, Firable, Formula, Holds, Not, Or, Start
@@ -34,7 +34,6 @@ T = TypeVar("T")
 
 ENDED: Final = Or((Holds(ACCIDENT), Holds(OVERRUN)))
 """The run has ended in an accident."""
-_MORE: Final = "give it a larger budget of markings, memory or time"
 
 
 @dataclass(frozen=True)
@@ -143,7 +142,7 @@ class Answered:
             found = self.of(family)
             for of, verdict in found.items():
                 if of in some and verdict.status is Status.VIOLATED:
-                    found[of] = replace(verdict, status=Status.UNKNOWN, bound=why, witness=None, code="", hint=_MORE)
+                    found[of] = replace(verdict, status=Status.UNKNOWN, bound=why, witness=None, code="", hint=LARGER)
             return _joined(self.loop, family, found)
 
         return replace(self, verdicts=tuple(map(joined, self.families)))

@@ -90,6 +90,10 @@ def test_an_interrupted_report_is_made_of_what_is_known(monkeypatch: pytest.Monk
     assert "interrupted" in report.course
     assert len(calls) == 2
     assert report.verdict("deadlock-free").status is Status.PROVED  # known from the exploration
+    calls.clear()
+    report = check(catalogue_net("one_robot"), budget=Budget(markings=5), method="explicit")
+    assert report.verdict("live").status is Status.UNKNOWN
+    assert report.verdict("live").hint == "ask again, and let it come to its end", "a larger budget would not help"
 
 
 def test_interrupted_twice_ends_all(monkeypatch: pytest.MonkeyPatch) -> None:
