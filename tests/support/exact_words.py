@@ -12,6 +12,7 @@ import io
 import socket
 from collections.abc import Callable, Mapping
 from contextlib import redirect_stderr
+from itertools import count
 from pathlib import Path
 from typing import Final
 from unittest.mock import patch
@@ -25,6 +26,10 @@ from firable.cli.text import reasons
 from firable.cli.view.moment import moment_of
 from firable.decompose.protocol.exploring import explore_protocol
 from firable.decompose.protocol.wrong import WRONG, example
+from firable.executor.drivers.binding import parse_binding
+from firable.executor.drivers.cancelling import ended
+from firable.executor.drivers.far_side.modbus_server import ModbusTcpEnd
+from firable.executor.drivers.rivals import demand_alone
 from firable.executor.journal.sqlite_journal import SqliteJournal
 from firable.executor.links.link import Greeting, Refusal, come_back_without, objection
 from firable.executor.links.storages import Estranged
@@ -116,6 +121,30 @@ def a_journal_that_is_open(folder: Path) -> str:
         return refusal(lambda: SqliteJournal(folder / "cell.journal", "d1", ("a",)))
     finally:
         first.close()
+
+
+def a_device_with_the_heartbeat_of_another(_: Path) -> str:
+    async def listen() -> None:
+        end = ModbusTcpEnd()
+        await end.start(lambda _point, _value: None)
+        text = (
+            "firable_bind: 1\ncell: c\ndevices:\n  plc:\n    driver: modbus-tcp\n    host: 127.0.0.1\n"
+            f"    port: {end.port}\n    heartbeat: {{write: holding 0, every_s: 0.2}}\n"
+        )
+
+        async def another() -> None:
+            for beat in count():
+                end.show("holding 0", beat)
+                await asyncio.sleep(0.01)
+
+        beating = asyncio.create_task(another())
+        try:
+            await demand_alone(parse_binding(text, "cell.bind.yaml"))
+        finally:
+            await ended([beating])
+            await end.stop()
+
+    return refusal(lambda: asyncio.run(listen()))
 
 
 def a_port_that_is_taken(_: Path) -> str:
@@ -225,6 +254,16 @@ error[F5061]: the operator's endpoint cannot be had at 127.0.0.1:8080: Address a
         """\
 error[F5070]: the page speaks of a marking that the net cannot have
   hint: load the page again; its server may be another one now
+""",
+    ),
+    "F5106": (
+        a_device_with_the_heartbeat_of_another,
+        """\
+cell.bind.yaml:8:17: error[F5106]: another program sends the heartbeat of 'plc', at 'holding 0', and commands its\
+ machines
+    8 |     heartbeat: {write: holding 0, every_s: 0.2}
+                        ^^^^^
+  hint: this run has not begun, and has written nothing: end that program first, or name the device that is meant
 """,
     ),
     "F9001": (

@@ -26,7 +26,7 @@ APART = binding_text(CELL.net, PORTS, plant_of("one_robot").sensors)
 TOGETHER = binding_text(CELL.net, {"modbus": "1502", "opcua": "1484"}, plant_of("one_robot").sensors)
 """R and CV1 at modbus, MC and CV2 at opcua."""
 
-TWO = parse_net("""
+TWO_TEXT = """
 firable: 1
 cell: two
 controllers:
@@ -35,7 +35,8 @@ controllers:
 transitions:
   on-a: {from: a.free, to: a.lit, if: a.key}
   on-b: {from: b.free, to: b.lit, if: b.key}
-""")
+"""
+TWO = parse_net(TWO_TEXT)
 BINDING = """
 firable_bind: 1
 cell: two
@@ -106,7 +107,8 @@ def test_a_device_without_anything_that_stops_it_is_shared_by_channels_of_their_
     one_channel = BINDING.replace(
         "b.lit: {device: plc, channel: M}", "b.lit: {device: plc, channel: L, write: {coil 7: 1}}"
     )
-    assert refused(parse_binding(one_channel), TWO, part) == [
+    one_lamp = parse_net(TWO_TEXT.replace("machine: M", "machine: L"))
+    assert refused(parse_binding(one_channel), one_lamp, own_net(split(one_lamp), ["a"])) == [
         (
             "F5105",
             ("devices", "plc", "channels", "L"),

@@ -25,6 +25,8 @@ def installed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 class TestNumbers(DriverConformance):
+    shows_heartbeat = False
+
     @asynccontextmanager
     async def far_end(self) -> AsyncIterator[Far]:
         points = {role: f"the {role}" for role in (*ROLES, "number")}
@@ -32,6 +34,8 @@ class TestNumbers(DriverConformance):
 
 
 class TestTexts(DriverConformance):
+    shows_heartbeat = False
+
     @asynccontextmanager
     async def far_end(self) -> AsyncIterator[Far]:
         points = {role: f"the {role}" for role in (*ROLES, "command")}
