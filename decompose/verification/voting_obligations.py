@@ -11,10 +11,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
+from typing import ClassVar, Final
 
 from firable.decompose.verification.formulas import spelled
 from firable.decompose.verification.voting import ASTRAY, GO_ON, HOME, REPEATS, Part, Step, Voting, central
+from firable.nets.net import Transition
 from firable.nets.source import printable
 
 KINDS: Final = {
@@ -72,6 +73,13 @@ INVARIANT: Final = "|the invariant|"
 STANDING: Final = "|votes stand|"
 OPEN: Final = "|something is open|"
 
+_HEAD: Final = (
+    "Each block asserts that its sentence does not hold, so the answer `unsat` proves it.",
+    "The constants: a place of the protocol's net holds a token; `let` says what a step changes.",
+    "To check it with another solver: cvc5 --incremental FILE, or z3 FILE; every name is followed by `unsat`.",
+)
+_GIVEN: Final = "Given of the marking that the central net then has; the verdicts `persistent` of the same net show it."
+
 Literals = frozenset[tuple[str, bool]]
 Sentence = frozenset[Literals]
 
@@ -80,33 +88,44 @@ def _any(literals: Iterable[tuple[str, bool]]) -> Sentence:
     return frozenset(frozenset([literal]) for literal in literals)
 
 
-def _conjunction(texts: Iterable[str]) -> str:
+def conjunction(texts: Iterable[str]) -> str:
+    """The AND of some formulas, each once, in the order of their texts."""
     found = sorted(set(texts))
     return found[0] if len(found) == 1 else f"(and {' '.join(found)})" if found else "true"
 
 
-def _disjunction(texts: Iterable[str]) -> str:
+def disjunction(texts: Iterable[str]) -> str:
+    """The OR of some formulas, each once, in the order of their texts."""
     found = sorted(set(texts))
     return found[0] if len(found) == 1 else f"(or {' '.join(found)})" if found else "false"
 
 
-def _symbol(place: str) -> str:
+def symbol(place: str) -> str:
+    """A place as a variable of the file."""
     return f"|{spelled(place)}|"
 
 
 def _literal(place: str, full: bool) -> str:
-    return _symbol(place) if full else f"(not {_symbol(place)})"
+    return symbol(place) if full else f"(not {symbol(place)})"
 
 
-def _all(literals: Iterable[tuple[str, bool]]) -> str:
-    return _conjunction(_literal(*one) for one in literals)
+def cube(literals: Iterable[tuple[str, bool]]) -> str:
+    """All of some literals: places that are full, or empty."""
+    return conjunction(_literal(*one) for one in literals)
 
 
-def _text(sentence: Sentence) -> str:
-    return _disjunction(map(_all, sentence))
+def sentence_text(sentence: Sentence) -> str:
+    """An OR of ANDs."""
+    return disjunction(map(cube, sentence))
 
 
-def _demanded(step: Step) -> list[tuple[str, bool]]:
+def eq1(t: Transition) -> list[tuple[str, bool]]:
+    """Eq. (1) of a transition."""
+    return [*((p, True) for p in (*t.inputs, *t.permissive)), *((p, False) for p in (*t.outputs, *t.inhibitive))]
+
+
+def demanded(step: Step) -> list[tuple[str, bool]]:
+    """The same of a step."""
     return [(place, wanted) for place, values in step.demands.items() for wanted in values]
 
 
@@ -114,16 +133,22 @@ def _changes(step: Step) -> dict[str, bool]:
     return dict.fromkeys(step.takes, False) | dict.fromkeys(step.puts, True)
 
 
-def _then(step: Step, text: str) -> str:
-    changes = " ".join(sorted(f"({_symbol(p)} {'true' if full else 'false'})" for p, full in _changes(step).items()))
+def after(step: Step, text: str) -> str:
+    """What a formula says after a step that is taken."""
+    changes = " ".join(sorted(f"({symbol(p)} {'true' if full else 'false'})" for p, full in _changes(step).items()))
     return f"(let ({changes}) {text})" if changes else text
 
 
 def where_possible(step: Step, may: str, text: str) -> str:
     """What a formula says after a step that is taken where it can be."""
-    after = {place: _disjunction([_symbol(place), may]) for place in step.puts}
-    after |= {place: _conjunction([_symbol(place), f"(not {may})"]) for place in step.takes}
-    return f"(let ({' '.join(sorted(f'({_symbol(place)} {then})' for place, then in after.items()))}) {text})"
+    changes = {place: disjunction([symbol(place), may]) for place in step.puts}
+    changes |= {place: conjunction([symbol(place), f"(not {may})"]) for place in step.takes}
+    return f"(let ({' '.join(sorted(f'({symbol(place)} {then})' for place, then in changes.items()))}) {text})"
+
+
+def defined(formulas: Mapping[str, str]) -> Iterator[str]:
+    """The lines that define formulas by their names."""
+    return (f"(define-fun {name} () Bool {text})" for name, text in formulas.items())
 
 
 @dataclass(frozen=True)
@@ -131,6 +156,11 @@ class Obligations:
     """The file on the protocol of a net."""
 
     voting: Voting
+
+    kinds: ClassVar[Mapping[str, str]] = KINDS
+    """The kinds of its obligations, and what each says."""
+    assumed: ClassVar[tuple[str, ...]] = (INVARIANT,)
+    """What all obligations but the first may use."""
 
     @property
     def family(self) -> str:
@@ -146,45 +176,43 @@ class Obligations:
     def text(self) -> str:
         """The file."""
         start, *others = (
-            f'\n; {KINDS[name.partition(".")[0]]}\n(push 1)\n(echo "{spelled(name)}")\n'
+            f'\n; {self.kinds[name.partition(".")[0]]}\n(push 1)\n(echo "{spelled(name)}")\n'
             + "".join(f"(assert {one})\n" for one in asserted)
             + "(check-sat)\n(pop 1)\n"
             for name, asserted in self._blocks
         )
-        given = f"(assert {STANDING})\n" if self._persistent else ""
-        return "".join((self._head(), start, f"\n(assert {INVARIANT})\n", given, *others))
+        assumed = (*self.assumed, STANDING) if self._persistent else self.assumed
+        given = "".join(f"(assert {name})\n" for name in assumed)
+        return "".join((*(f"{line}\n" for line in self._head()), start, "\n", given, *others))
 
-    def _head(self) -> str:
-        net, under = self.voting.cut.net.name, ", under faults" if self.voting.faults else ""
-        comments = (
-            f"{self.family} of the protocol of '{net}'{under}: it does what the central net does",
-            "Each block asserts that its sentence does not hold, so the answer `unsat` proves it.",
-            "The constants: a place of the protocol's net holds a token; `let` says what a step changes.",
-            "To check it with another solver: cvc5 --incremental FILE, or z3 FILE; every name is followed by `unsat`.",
-        )
-        lines = [*(f"; {printable(comment)}" for comment in comments), "(set-logic QF_LIA)"]
-        lines += [f"(declare-const {_symbol(place)} Bool)" for place in sorted(self.voting.places)]
-        lines.append(f"(define-fun {INVARIANT} () Bool {_conjunction(map(_text, self._invariant))})")
+    def _head(self) -> Iterator[str]:
+        under = ", under faults" if self.voting.faults else ""
+        yield from self._declared(f"{under}: it does what the central net does", "QF_LIA")
+        yield from defined({INVARIANT: conjunction(map(sentence_text, self._invariant))})
+        yield from self._given()
+        yield from defined({OPEN: self._open} | {name: sentence_text(fact) for fact, name in self._facts.items()})
+
+    def _declared(self, says: str, logic: str) -> Iterator[str]:
+        for comment in (f"{self.family} of the protocol of '{self.voting.cut.net.name}'{says}", *_HEAD):
+            yield f"; {printable(comment)}"
+        yield f"(set-logic {logic})"
+        yield from (f"(declare-const {symbol(place)} Bool)" for place in sorted(self.voting.places))
+
+    def _given(self) -> Iterator[str]:
         if self._persistent:
-            what = (
-                "Given of the marking that the central net then has; the verdicts `persistent` of the same net show it."
-            )
-            votes = _conjunction(map(_text, self._persistent))
-            lines += [f"; {what}", f"(define-fun {STANDING} () Bool {votes})"]
-        defined = {OPEN: self._open} | {symbol: _text(fact) for fact, symbol in self._facts.items()}
-        lines += [f"(define-fun {symbol} () Bool {text})" for symbol, text in defined.items()]
-        return "".join(f"{line}\n" for line in lines)
+            yield f"; {_GIVEN}"
+            yield from defined({STANDING: conjunction(map(sentence_text, self._persistent))})
 
     @cached_property
     def _blocks(self) -> tuple[tuple[str, list[str]], ...]:
         return (
-            ("starts", [_all(self.voting.places.items()), f"(not {INVARIANT})"]),
+            ("starts", [cube(self.voting.places.items()), f"(not {INVARIANT})"]),
             *self._keeping(),
             *self._safe(),
             *(() if self.voting.faults else self._tokens()),
             *self._home(),
             *self._ways(),
-            *(() if self.voting.faults else [("divergence", [f"(not {_conjunction(self._falling())})"])]),
+            *(() if self.voting.faults else [("divergence", [f"(not {conjunction(self._falling())})"])]),
         )
 
     # --- The invariant, and what is still to be done
@@ -216,14 +244,12 @@ class Obligations:
             for rule in (_ALWAYS_OF_FREE if part.free else _ALWAYS).split(";"):
                 given, then = (self._literals(part, words) for words in rule.split(">"))
                 yield _any([*((place, not full) for place, full in given), *then])
-            promised, own = (part.at("promised"), False), part.own
-            needs = [(p, True) for p in (*own.inputs, *own.permissive)]
-            needs += [(p, False) for p in (*own.outputs, *own.inhibitive)]
+            promised, needs = (part.at("promised"), False), eq1(part.own)
             if part.free:
                 underway, no_vote = self._literals(part, "committed -obeyed"), (part.at("stands"), False)
                 for p, full in needs:
                     yield _any([no_vote, (central(p), full)]) | {underway}
-                    if p in part.writes and full == (p in own.inputs):
+                    if p in part.writes and full == (p in part.own.inputs):
                         yield _any([no_vote, (p, full)])
                 continue
             for need in needs:
@@ -262,7 +288,7 @@ class Obligations:
 
     @cached_property
     def _facts(self) -> dict[Sentence, str]:
-        return {fact: f"|to do {i}|" for i, fact in enumerate(sorted(set(self._to_do()), key=_text), 1)}
+        return {fact: f"|to do {i}|" for i, fact in enumerate(sorted(set(self._to_do()), key=sentence_text), 1)}
 
     def _to_do(self) -> Iterator[Sentence]:
         for group in self.voting.groups:
@@ -286,40 +312,40 @@ class Obligations:
     def _keeping(self) -> Iterator[tuple[str, list[str]]]:
         written: dict[tuple[str, bool], list[str]] = {}
         for sentence in self._invariant:
-            text = _text(sentence)
+            text = sentence_text(sentence)
             for literal in {literal for term in sentence for literal in term}:
                 written.setdefault(literal, []).append(text)
         for name, step in self.voting.steps.items():
             broken = (text for place, full in _changes(step).items() for text in written.get((place, not full), ()))
-            yield f"keeps.{name}", [_all(_demanded(step)), f"(not {_then(step, _conjunction(broken))})"]
+            yield f"keeps.{name}", [cube(demanded(step)), f"(not {after(step, conjunction(broken))})"]
 
     def _safe(self) -> Iterator[tuple[str, list[str]]]:
-        yield "follows", [_symbol(ASTRAY)]
-        yield "agrees", [_all((self.voting.decided(group[0]), False) for group in self.voting.groups), self._differs]
+        yield "follows", [symbol(ASTRAY)]
+        yield "agrees", [cube((self.voting.decided(group[0]), False) for group in self.voting.groups), self._differs]
         cases = []
         for part in self.voting.all_parts:
             own = part.own
             missing = [(place, False) for place in (*own.inputs, *own.permissive)]
             in_the_way = [(place, True) for place in (*own.outputs, *own.inhibitive)]
-            there = _symbol(part.at("commit-order")), _symbol(part.at("promised"))
+            there = symbol(part.at("commit-order")), symbol(part.at("promised"))
             if part.free:  # only what it moves has to be as it was
                 missing = [(place, False) for place in (part.at("stands"), *own.inputs)]
                 in_the_way = [(place, True) for place in own.outputs]
                 there = there[0], _literal(part.at("obeyed"), full=False)
-            cases.append(_conjunction([*there, _disjunction(_literal(*one) for one in (*missing, *in_the_way))]))
+            cases.append(conjunction([*there, disjunction(_literal(*one) for one in (*missing, *in_the_way))]))
         if cases:
-            yield "orders-fit", [_disjunction(cases)]
+            yield "orders-fit", [disjunction(cases)]
 
     @cached_property
     def _differs(self) -> str:
-        pairs = ((_symbol(place.name), _symbol(central(place.name))) for place in self.voting.cut.net.places)
-        return _disjunction(f"(not (= {here} {there}))" for here, there in pairs)
+        pairs = ((symbol(place.name), symbol(central(place.name))) for place in self.voting.cut.net.places)
+        return disjunction(f"(not (= {here} {there}))" for here, there in pairs)
 
     @cached_property
     def _open(self) -> str:
         net = {name for place in self.voting.cut.net.places for name in (place.name, central(place.name))}
         net |= {part.at(kind) for part in self.voting.all_parts if part.free for kind in ("stands", "heard")}
-        return _disjunction([*(_symbol(p) for p in self.voting.places if p not in net and p != GO_ON), self._differs])
+        return disjunction([*(symbol(p) for p in self.voting.places if p not in net and p != GO_ON), self._differs])
 
     def _tokens(self) -> Iterator[tuple[str, list[str]]]:
         for name, step in self.voting.steps.items():
@@ -329,20 +355,20 @@ class Obligations:
                 t = self.voting.cut.net.transition(step.fires)
                 around = [*((p, True) for p in (*t.inputs, *t.permissive)), *((p, False) for p in t.inhibitive)]
                 contact = [_literal(central(p), full) for p, full in around]
-                contact.append(_disjunction(_symbol(central(p)) for p in t.outputs))
-                texts.append(f"(not {_conjunction(contact)})")
+                contact.append(disjunction(symbol(central(p)) for p in t.outputs))
+                texts.append(f"(not {conjunction(contact)})")
                 for part in (part for part in self.voting.all_parts if part.free):
                     if not step.puts.isdisjoint(part.own.inputs):
-                        texts.append(f"(not {_all(self._literals(part, 'committed -obeyed'))})")
+                        texts.append(f"(not {cube(self._literals(part, 'committed -obeyed'))})")
             if step.puts:
-                yield f"one-token.{name}", [_conjunction(texts), _disjunction(map(_symbol, step.puts))]
+                yield f"one-token.{name}", [conjunction(texts), disjunction(map(symbol, step.puts))]
 
     @property
     def _ceased(self) -> list[str]:
-        return [f"(not {_symbol(GO_ON)})"] if self.voting.faults else []
+        return [f"(not {symbol(GO_ON)})"] if self.voting.faults else []
 
     def _home(self) -> Iterator[tuple[str, list[str]]]:
-        yield "home", [*self._ceased, OPEN, f"(not {_disjunction(self._ways_home.values())})"]
+        yield "home", [*self._ceased, OPEN, f"(not {disjunction(self._ways_home.values())})"]
         yield from self._leading()
 
     @cached_property
@@ -352,7 +378,7 @@ class Obligations:
         for name, step in self.voting.steps.items():
             if HOME in step.kind:
                 orders = (p.split("/", 1) for p in step.puts if p.startswith(("commit-order/", "abort-order/")))
-                ways[name] = _all([*_demanded(step), *((f"acknowledgement/{part}", False) for _, part in orders)])
+                ways[name] = cube([*demanded(step), *((f"acknowledgement/{part}", False) for _, part in orders)])
         return ways
 
     def _leading(self) -> Iterator[tuple[str, list[str]]]:
@@ -365,23 +391,22 @@ class Obligations:
             changes = _changes(self.voting.steps[name])
             up = {fact for place, full in changes.items() for fact in at.get((place, full), ())}
             down = {fact for place, full in changes.items() for fact in at.get((place, not full), ())}
-            no_more = [f"(or {self._facts[fact]} (not {_text(fact)}))" for fact in up]
-            one_less = _disjunction(f"(and {self._facts[fact]} (not {_text(fact)}))" for fact in down)
-            less = _then(self.voting.steps[name], _conjunction([*no_more, one_less]))
+            no_more = [f"(or {self._facts[fact]} (not {sentence_text(fact)}))" for fact in up]
+            one_less = disjunction(f"(and {self._facts[fact]} (not {sentence_text(fact)}))" for fact in down)
+            less = after(self.voting.steps[name], conjunction([*no_more, one_less]))
             yield f"homeward.{name}", [way, f"(not {less})"]
 
     def _ways(self) -> Iterator[tuple[str, list[str]]]:
         for t in sorted(self.voting.transitions, key=lambda t: t.name):
             text = "true"
             for step, must in reversed(self.voting.way(t.name)):
-                demanded = [_literal(*one) for one in _demanded(step)]
+                needs = [_literal(*one) for one in demanded(step)]
                 if must:
-                    text = _conjunction([*demanded, _then(step, text)])
+                    text = conjunction([*needs, after(step, text)])
                 else:
-                    text = where_possible(step, _conjunction(demanded), text)
-            can = [(central(p), True) for p in (*t.inputs, *t.permissive)]
-            can += [(central(p), False) for p in (*t.outputs, *t.inhibitive)]
-            yield f"way.{t.name}", [*self._ceased, _all(can), f"(not {OPEN})", f"(not {text})"]
+                    text = where_possible(step, conjunction(needs), text)
+            can = cube((central(p), full) for p, full in eq1(t))
+            yield f"way.{t.name}", [*self._ceased, can, f"(not {OPEN})", f"(not {text})"]
 
     def _falling(self) -> Iterator[str]:
         weights = {
