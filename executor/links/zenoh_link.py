@@ -31,7 +31,6 @@ full is dropped. A sync of the journal is on a thread of its own in any case, so
 from __future__ import annotations
 
 import asyncio
-import ipaddress
 import json
 from collections import deque
 from collections.abc import Sequence
@@ -49,6 +48,7 @@ from firable.executor.links.lending import LendingLoop
 from firable.executor.links.link import COORDINATOR, QUESTION, Arrival, Greeting, LinkListener, cannot_open, objection
 from firable.executor.links.standing import Standing
 from firable.executor.links.storages import Storage
+from firable.executor.loopback import is_loopback
 from firable.executor.protocol.messages import Message
 from firable.nets.diagnostics import Diagnostic, Severity
 from firable.nets.source import printable
@@ -335,18 +335,11 @@ def open_to_the_network(addresses: Sequence[str]) -> tuple[Diagnostic, ...]:
     for address in addresses:
         protocol, _, rest = address.partition("/")
         host = rest.rpartition(":")[0].strip("[]")
-        if protocol != "tls" and not _is_loopback(host):
+        if protocol != "tls" and not is_loopback(host):
             message = f"{printable(address)} is open to the network: whoever reaches it can take part in the cell"
             hint = "use tls/ with the certificates of the site, or a network that nobody else is on"
             found.append(Diagnostic("F5022", message, hint, severity=Severity.WARNING))
     return tuple(found)
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
 
 
 @lru_cache(maxsize=1000)

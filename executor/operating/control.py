@@ -26,7 +26,6 @@ step. Rejected: a server process of its own (uvicorn), which takes the signals o
 from __future__ import annotations
 
 import asyncio
-import ipaddress
 import logging
 import secrets
 import ssl
@@ -41,6 +40,7 @@ from aiohttp import web
 from aiohttp.http_exceptions import HttpProcessingError
 from aiohttp.typedefs import Handler, Middleware
 
+from firable.executor.loopback import is_loopback
 from firable.executor.operating.own_certificate import fault_of, fault_of_authority, unloaded
 from firable.executor.operating.situation import Situation, State
 from firable.executor.protocol.commands import SAID, Answer
@@ -130,7 +130,7 @@ class Endpoint:
     tls: ssl.SSLContext | None = None
 
     def __post_init__(self) -> None:
-        if self.tls is None and not _is_loopback(self.host):
+        if self.tls is None and not is_loopback(self.host):
             message = f"the operator's endpoint would be open on {self.host}, without TLS"
             hint = "give --serve-tls CERT KEY, or serve on 127.0.0.1 and come through a tunnel"
             raise InputError([Diagnostic("F5060", message, hint)])
@@ -359,10 +359,3 @@ def _situation(run: Operated) -> dict[str, object]:
         "marking": list(now.marking),
         "blocked": [str(blocked) for blocked in now.blocked],
     }
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
