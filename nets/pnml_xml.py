@@ -68,7 +68,7 @@ class PnmlRecords:
     """The first element that only another class of nets has, and the name of that class."""
 
 
-def parse_xml(source: Source, data: bytes, encoding: str | None = None) -> PnmlRecords:
+def parse_xml(source: Source, data: bytes, encoding: str | None) -> PnmlRecords:
     """Read the records of the one net of a PNML file; `encoding` overrides what the file says of itself.
 
     Raises `InputError`: F1002 empty, F1013 where it is not XML or not PNML, F1014 where it holds several nets.

@@ -223,29 +223,27 @@ def _refuse_other_hosts(net: Net, traces: Sequence[Trace]) -> None:
     where: dict[str, Trace] = {}
     for trace in traces:
         if trace.header.digest != traces[0].header.digest or trace.header.net != net.name:
-            raise _not_together(trace, 1, "the traces are of different nets", "give those of one run")
+            raise _not_together(trace, "the traces are of different nets", "give those of one run")
         if not trace.header.machines:
-            raise _not_together(trace, 1, "this is the trace of a whole run, not of one host", "replay it by itself")
+            raise _not_together(trace, "this is the trace of a whole run, not of one host", "replay it by itself")
         for name in trace.header.machines:
             if name in where:
                 other = printable(where[name].file)
-                raise _not_together(
-                    trace, 1, f"'{name}' has two traces: this one, and {other}", "leave one of them out"
-                )
+                raise _not_together(trace, f"'{name}' has two traces: this one, and {other}", "leave one of them out")
             where[name] = trace
     later = [trace for trace in traces if trace.header.start is not None]
     owners = {place.owner for place in net.places}
     if later and any(trace.header.start is None and owners & {*trace.header.machines} for trace in traces):
         message = "this one begins where a cell was taken over, and another in the initial marking"
-        raise _not_together(later[0], 1, message, "give those of one run: all hosts are taken over together")
+        raise _not_together(later[0], message, "give those of one run: all hosts are taken over together")
     names = {COORDINATOR: "the coordinator", **{c.name: f"'{c.name}'" for c in net.controllers}}
     if missing := [called for name, called in names.items() if name not in where]:
         message = f"there is no trace of {', '.join(missing)}"
-        raise _not_together(traces[0], 1, message, "give the traces of all hosts of the run")
+        raise _not_together(traces[0], message, "give the traces of all hosts of the run")
 
 
-def _not_together(trace: Trace, line: int, message: str, hint: str) -> InputError:
-    return InputError([Diagnostic("F5005", message, hint, span=Span(printable(trace.file), line, 1))])
+def _not_together(trace: Trace, message: str, hint: str) -> InputError:
+    return InputError([Diagnostic("F5005", message, hint, span=Span(printable(trace.file), 1, 1))])
 
 
 def _refusal(trace: Trace, line: int, message: str, hint: str) -> InputError:

@@ -113,11 +113,11 @@ def branching_bisimilar(
     return classes[0] == classes[a.n_markings]
 
 
-def branching_classes(moves: Sequence[Collection[tuple[Label, int]]], *, divergence: bool = True) -> list[int]:
+def branching_classes(moves: Sequence[Collection[tuple[Label, int]]], *, divergence: bool) -> list[int]:
     """The class of each node under branching bisimilarity; a move with the empty label is hidden.
 
     >>> x, hidden = frozenset({"x"}), frozenset()
-    >>> branching_classes([[(hidden, 1)], [(x, 2)], []])
+    >>> branching_classes([[(hidden, 1)], [(x, 2)], []], divergence=True)
     [0, 0, 1]
     """
     hidden: nx.DiGraph[int] = nx.DiGraph()

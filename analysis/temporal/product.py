@@ -72,12 +72,11 @@ class Product(Generic[S]):
         """The strongly connected parts of the automaton, each after all that it leads to."""
         return components([[edge.target for edge in edges] for edges in self.edges])
 
-    def reaching(self, goal: Pairs[S], within: Pairs[S] | None = None) -> Pairs[S]:
-        """The pairs from which a pair of the goal can be reached, going only through `within`."""
+    def reaching(self, goal: Pairs[S]) -> Pairs[S]:
+        """The pairs from which a pair of the goal can be reached."""
         found = Steps(self, {})
         for part in self.parts:
-            states = [state for state in part if within is None or state in within]
-            self._close(found, states, {state: goal.get(state, self.sets.none) for state in states}, within)
+            self._close(found, part, {state: goal.get(state, self.sets.none) for state in part}, None)
         return found.pairs
 
     def _close(

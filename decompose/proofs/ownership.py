@@ -12,16 +12,16 @@ from collections.abc import Iterator
 
 from firable.decompose.proofs.obligation import Obligation, called, facts, repeated
 from firable.decompose.proofs.sides import Sides
-from firable.nets.net import Net, Place, Signal
+from firable.nets.net import Controller, Net, Place, Signal
 
 
 def ownership(sides: Sides) -> Iterator[Obligation]:
     """The one obligation on who owns what."""
     net = sides.net
-    central = [f"controller {_json([c.name, c.coordinator])}" for c in net.controllers]
+    central = [f"controller {_json(c)}" for c in net.controllers]
     central += [f"{c.name} has one subnet, without arbiters" for c in net.controllers]
     central += [f"{called(item.owner)} owns {item.name}" for item in _owned(net)]
-    made = [f"controller {_json([c.name, c.coordinator])}" for subnet in sides.subnets for c in subnet.controllers]
+    made = [f"controller {_json(c)}" for subnet in sides.subnets for c in subnet.controllers]
     for subnet in sides.subnets:
         made.append(f"{subnet.name} has {'other subnets' if subnet.arbiters else 'one subnet, without arbiters'}")
         made += [f"{subnet.name} owns {item.name}" for item in _owned(subnet)]
@@ -45,5 +45,5 @@ def _owned(net: Net) -> tuple[Place | Signal, ...]:
     return (*net.places, *net.signals)
 
 
-def _json(data: object) -> str:
-    return json.dumps(data, ensure_ascii=True)
+def _json(of: Controller) -> str:
+    return json.dumps([of.name, of.coordinator], ensure_ascii=True)

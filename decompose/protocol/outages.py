@@ -101,7 +101,7 @@ class Outage:
         return f"controller {self.who}" if self.who else self.coordinator
 
 
-def fault_exploration(decomposition: Decomposition, limits: Limits | None = None) -> Exploration:
+def fault_exploration(decomposition: Decomposition, limits: Limits) -> Exploration:
     """All runs of the protocol under any number of faults of each kind, which includes one of each."""
     return explore_protocol(decomposition, PROTOCOL, ANY_FAULTS, limits=limits)
 

@@ -135,12 +135,12 @@ class Persistence:
             if vote.part in may and (vote.settled or _name(vote) in shown)
         )
 
-    def evidence(self, limits: Limits | None = None) -> Document:
+    def evidence(self) -> Document:
         """The document on every decided verdict that the arcs and units do not settle.
 
         A record for each, without a name, in the order of the votes: that the goal of the vote is never reached, or is.
         """
-        limits = limits or Limits(Deadline.after(SECONDS))
+        limits = Limits(Deadline.after(SECONDS))
         flat = [finding for of in self.findings.values() for finding in of]
         certifier = Certifier(self.decomposition.net, Discipline.INTERLEAVING, limits, self.space, flat)
         shown = (
@@ -148,13 +148,13 @@ class Persistence:
         )
         return Document(self.decomposition.net, Discipline.INTERLEAVING, tuple(shown))
 
-    def with_evidence(self, limits: Limits | None = None) -> tuple[tuple[Verdict, ...], Mapping[str, str]]:
+    def with_evidence(self) -> tuple[tuple[Verdict, ...], Mapping[str, str]]:
         """The verdicts on the votes that arcs and units do not settle, with the document on them by its name.
 
         Those that the document shows name it. On the other votes there are obligations
         (`firable.decompose.proofs.persistent`).
         """
-        document = self.evidence(limits)
+        document = self.evidence()
         records = iter(document.records)
         verdicts = []
         for _, verdict in self._open():

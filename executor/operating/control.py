@@ -215,7 +215,7 @@ async def listening(app: web.Application, endpoint: Endpoint, strangers: Strange
         await runner.cleanup()
 
 
-def admission(endpoint: Endpoint, public: Collection[str] = (), strangers: Strangers | None = None) -> Middleware:
+def admission(endpoint: Endpoint, public: Collection[str], strangers: Strangers | None = None) -> Middleware:
     """Let only those reach a handler who may, but for the paths that are public."""
     strangers = strangers or Strangers()
 

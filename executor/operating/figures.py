@@ -24,6 +24,6 @@ class Figures(Protocol):
         """A message between a controller and a coordinator, or one that is said again."""
         ...
 
-    def inputs_coalesced(self, signal: str, changes: int = 1) -> None:
+    def inputs_coalesced(self, signal: str, changes: int) -> None:
         """Changes of a signal that came faster than they were read."""
         ...

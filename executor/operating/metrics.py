@@ -161,7 +161,7 @@ class Metrics:
         """Say how far what a driver reads of a signal may be believed."""
         self.good.labels(signal).set(good)
 
-    def inputs_coalesced(self, signal: str, changes: int = 1) -> None:
+    def inputs_coalesced(self, signal: str, changes: int) -> None:
         """Count changes of a signal that a driver saw and could not hand over one by one."""
         self.coalesced.labels(signal).inc(changes)
 

@@ -87,7 +87,6 @@ class Peers:
         work: Callable[[], None],
         begin: Callable[[], None],
         end: Callable[[InputError], None],
-        repeat_seconds: float = REPEAT_SECONDS,
     ) -> None:
         self.acts = acts
         self.acquaintances = acquaintances
@@ -96,7 +95,7 @@ class Peers:
         self.end = end
         self.link = link
         self.told = told
-        self.repeat_seconds = self.pause_seconds = repeat_seconds
+        self.repeat_seconds = self.pause_seconds = REPEAT_SECONDS
         self.here = here = {*acts.coordinators, *acts.controllers}
         self.names = {*coordinators(decomposition), *(subnet.name for subnet in decomposition.subnets)} - here
         self.deciding = {above for controller in acts.controllers.values() for above in controller.above} - here
@@ -460,7 +459,7 @@ class Peers:
             if asyncio.get_running_loop().time() >= self.keep_due_seconds:
                 self._keep_ages()
         self.acts.repeat()
-        self._repeat_later(min(2 * self.pause_seconds, max(REPEAT_SECONDS_MAX, self.repeat_seconds)))
+        self._repeat_later(min(2 * self.pause_seconds, REPEAT_SECONDS_MAX))
 
     def _missing(self, name: str) -> str:
         """What is said of one that has not come: it was refused, or nobody has heard of it."""

@@ -132,7 +132,7 @@ def blocked(player: TokenPlayer, word: Word, untaken: Collection[str] = ()) -> I
         )
 
 
-def blocked_parts(controller: LocalController, untaken: Collection[str] = ()) -> Iterator[Blocked]:
+def blocked_parts(controller: LocalController, untaken: Collection[str]) -> Iterator[Blocked]:
     """The same of one controller, as far as it knows: a part of a coordinated transition bears its name."""
     row_of = {part.name: row for row, part in controller.parts.items()}
     decided_by = {row: above.name for above in controller.above.values() for row in above.parts}
@@ -141,7 +141,7 @@ def blocked_parts(controller: LocalController, untaken: Collection[str] = ()) ->
         yield replace(one, transition=row, decided_by=decided_by.get(row))
 
 
-def blocked_here(controllers: Iterable[LocalController], untaken: Collection[str] = ()) -> tuple[Blocked, ...]:
+def blocked_here(controllers: Iterable[LocalController], untaken: Collection[str]) -> tuple[Blocked, ...]:
     """The same of several controllers of one host: the parts of a transition that are here wait as one."""
     found: dict[str, Blocked] = {}
     for one in (each for controller in controllers for each in blocked_parts(controller, untaken)):

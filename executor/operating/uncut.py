@@ -23,7 +23,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any, Final
@@ -113,15 +113,14 @@ def ended_by_signals(patience: Patience | None = None) -> Iterator[None]:
 class Guard:
     """A thread that ends the process if it has not been called off in time."""
 
-    def __init__(self, seconds: float, end: Callable[[], object] | None = None) -> None:
+    def __init__(self, seconds: float) -> None:
         self.seconds = seconds
-        self.give_up = end or _end_the_process
         self.timer: threading.Timer | None = None
 
     def begin(self, seconds: float | None = None) -> None:
         """Wait from now on, for so long."""
         self.end()
-        self.timer = threading.Timer(self.seconds if seconds is None else seconds, self.give_up)
+        self.timer = threading.Timer(self.seconds if seconds is None else seconds, _end_the_process)
         self.timer.daemon = True
         self.timer.start()
 

@@ -75,7 +75,7 @@ Hidden = list[tuple[tuple[int, ...], tuple[Marking, ...]]]
 class WatchedLoop:
     """The loop of a net and the machines of a plant; raises `InputError` F5003 where they do not fit."""
 
-    def __init__(self, net: Net, model: PlantModel, elsewhere: Collection[str] = ()) -> None:
+    def __init__(self, net: Net, model: PlantModel, elsewhere: Collection[str]) -> None:
         loop = close(_without_sensor_gates(net), model, sending=Sending.LATE)
         laws = Laws(model, net)
         self.net = net

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from firable.analysis.deadline import NEVER, Deadline
+from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.certificate import (
     Diagram,
     InductiveInvariant,
@@ -38,7 +38,7 @@ class Left:
     words: str
 
 
-def left_of(evidence: Evidence, deadline: Deadline = NEVER) -> Left:
+def left_of(evidence: Evidence, deadline: Deadline) -> Left:
     """What a reduction leaves to be shown; refused where a step cannot be taken, raises `TimeIsOverError`."""
     of, net = evidence.certificate, evidence.net
     if not isinstance(of, Reduction):

@@ -38,7 +38,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from typing import Protocol
 
-from firable.analysis.deadline import NEVER, Deadline
+from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.checking.listed import OUTSIDE
 from firable.analysis.evidence.refusal import TimeIsOverError, refuse, shown
 from firable.nets.formula import Constant, Formula
@@ -246,7 +246,7 @@ class Edges(Protocol):
 class Unfolding:
     """The nodes that the negation of a formula leads to, from M0."""
 
-    def __init__(self, space: Unfoldable, formula: Temporal, deadline: Deadline = NEVER) -> None:
+    def __init__(self, space: Unfoldable, formula: Temporal, deadline: Deadline) -> None:
         self.space, self.formula, self.deadline = space, formula, deadline
         self.tableau = _Tableau(formula, deadline, negative=True)
         self.nodes = 0
