@@ -110,7 +110,7 @@ def _of_part(parts: Parts, part: Part) -> Iterator[Sentence]:
     yield implied(commit, commits)
     yield implied(abort, negated(commits))
     yield implied(abort, negated(heard))
-    for place, full in _needs(part):  # V2
+    for place, full in demands(part):  # V2
         yield implied(promised, over, (place, full))
         yield clause(negated(promised), negated(commits), (place, full))
     yield from (implied(promised, (at("promised", other), False)) for other in parts.excluding(part))  # V3
@@ -131,7 +131,7 @@ def _of_free(part: Part) -> Iterator[Sentence]:
     yield implied(commits, stands, obeyed)  # F3
     for places, full in ((part.inputs, True), (part.outputs, False)):  # F1
         yield from (implied(stands, (place, full)) for place in places)
-    for place, full in _needs(part):  # F2
+    for place, full in demands(part):  # F2
         yield (*clause(negated(stands), (central(place), full)), (commits, negated(obeyed)))
 
 
@@ -144,18 +144,12 @@ def persistent(protocol: ProtocolNet) -> Iterator[Sentence]:
     said = set(protocol.parts.decomposition.free)
     every = (part for its in protocol.parts.coordinated.values() for part in its if part.free)
     for part in (part for part in every if (part.whole, part.controller) in said):
-        yes = set(_needs(part))
+        yes = set(demands(part))
         for t in protocol.parts.transitions:
             taken = {*((place, True) for place in t.inputs), *((place, False) for place in t.outputs)}
             both = yes | set(demands(t))
             if t.name != part.whole and taken & yes and both.isdisjoint(map(negated, both)):
                 yield clause(*((central(place), not full) for place, full in both))
-
-
-def _needs(part: Part) -> Iterator[Literal]:
-    """Eq. (1) of a part."""
-    yield from ((place, True) for place in (*part.inputs, *part.permissive))
-    yield from ((place, False) for place in (*part.outputs, *part.inhibitive))
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,10 +234,10 @@ def may_go_on(protocol: ProtocolNet) -> tuple[Literal, ...]:
     return ((GO_ON, False),) if GO_ON in protocol.net.place_index else ()
 
 
-def demands(t: Transition) -> Iterator[Literal]:
+def demands(of: Transition | Part) -> Iterator[Literal]:
     """Eq. (1)."""
-    yield from ((place, True) for place in (*t.inputs, *t.permissive))
-    yield from ((place, False) for place in (*t.outputs, *t.inhibitive))
+    yield from ((place, True) for place in (*of.inputs, *of.permissive))
+    yield from ((place, False) for place in (*of.outputs, *of.inhibitive))
 
 
 def effect(t: Transition) -> dict[str, bool]:
