@@ -18,6 +18,7 @@ from collections import deque
 from collections.abc import Iterator
 from typing import Final
 
+from firable.nets.bits import bits
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import Wait
 
@@ -42,7 +43,7 @@ def circle(net: Net, marking: Marking) -> tuple[Wait, ...]:
     """
     waits = _Waits(net, marking)
     shortest: tuple[Wait, ...] = ()
-    for p in list(_places(marking))[:_STARTS_MAX]:
+    for p in list(bits(marking))[:_STARTS_MAX]:
         for t in net.consumers[p]:
             found = waits.back_to((p, t))
             if found and (not shortest or len(found) < len(shortest)):
@@ -83,14 +84,14 @@ class _Waits:
     def _found(self, node: _Node) -> Iterator[tuple[_Node, Wait]]:
         net, marking, (p, t) = self._net, self._marking, node
         held, transition, masks = net.places[p].name, net.transitions[t], net.masks[t]
-        for full in _places((masks.outputs | masks.inhibitive) & marking):
+        for full in bits((masks.outputs | masks.inhibitive) & marking):
             name = net.places[full].name
             for taking in net.consumers[full]:
                 yield (
                     (full, taking),
                     Wait(held, transition.name, name, wanted=False, holder=name, by=(net.transitions[taking].name,)),
                 )
-        for empty in _places((masks.inputs | masks.permissive) & ~marking):
+        for empty in bits((masks.inputs | masks.permissive) & ~marking):
             for holder, way in self._holders(empty):
                 by = tuple(net.transitions[u].name for u in way)
                 yield (
@@ -118,7 +119,7 @@ class _Waits:
             further: list[_Holder] = []
             for place, way in level:
                 for u in net.producers[place]:
-                    for before in _places(net.masks[u].inputs):
+                    for before in bits(net.masks[u].inputs):
                         if before in seen or (within is not None and net.places[before].owner != within):
                             continue
                         seen.add(before)
@@ -127,11 +128,3 @@ class _Waits:
                 return found
             level = further
         return []
-
-
-def _places(marking: Marking) -> Iterator[int]:
-    """The places in a marking, by index."""
-    while marking:
-        lowest = marking & -marking
-        yield lowest.bit_length() - 1
-        marking ^= lowest

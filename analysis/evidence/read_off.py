@@ -12,6 +12,7 @@ from typing import Final
 
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.refusal import in_time
+from firable.nets.bits import bits
 from firable.nets.net import Marking, Net, SignalKind, Transition
 from firable.semantics.algebra import BOOL
 from firable.semantics.arbitration import Arbitration
@@ -109,9 +110,8 @@ class _MayFire:
         """Those that are firable in the next marking."""
         changed, self.marking = self.marking ^ marking, marking
         again = set[int]()
-        while changed:
-            again.update(self.beside[changed.bit_length() - 1])
-            changed ^= 1 << changed.bit_length() - 1
+        for p in bits(changed):
+            again.update(self.beside[p])
         for t in again:
             self._ask(t)
         return sorted(self.found)

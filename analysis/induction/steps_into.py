@@ -19,6 +19,7 @@ from firable.analysis.evidence.certificate import Clause
 from firable.analysis.induction.session import Session
 from firable.analysis.induction.smt import Answer, Term, Terms
 from firable.analysis.induction.strengthening import Facts
+from firable.nets.bits import bits
 from firable.nets.net import Marking, Net
 from firable.semantics.firing import firable
 
@@ -42,9 +43,9 @@ class Cube:
 
     def literals(self) -> Iterator[Cube]:
         """The cubes of one literal whose intersection it is."""
-        for i in _bits(self.full):
+        for i in bits(self.full):
             yield Cube(1 << i, 0)
-        for i in _bits(self.empty):
+        for i in bits(self.empty):
             yield Cube(0, 1 << i)
 
     def without(self, other: Cube) -> Cube:
@@ -54,13 +55,6 @@ class Cube:
     def order(self) -> tuple[int, int, int]:
         """A key that puts the general ones first."""
         return self.full.bit_count() + self.empty.bit_count(), self.full, self.empty
-
-
-def _bits(mask: Marking) -> Iterator[int]:
-    while mask:
-        lowest = mask & -mask
-        yield lowest.bit_length() - 1
-        mask ^= lowest
 
 
 class StepsInto:
@@ -118,7 +112,7 @@ class StepsInto:
         return self.session.some([*marked, *(self._empty_now[index[name]] for name in clause.empty)])
 
     def _not_in(self, cube: Cube) -> list[z3.BoolRef]:
-        return [*(self._empty_now[i] for i in _bits(cube.full)), *(self._now[i] for i in _bits(cube.empty))]
+        return [*(self._empty_now[i] for i in bits(cube.full)), *(self._now[i] for i in bits(cube.empty))]
 
     def block(self, cube: Cube, level: int) -> None:
         """No marking of the level, or of one below, is in the cube."""
@@ -156,8 +150,8 @@ class StepsInto:
 
         The cube given back includes the one asked about, and does not hold M0 if that does not.
         """
-        wanted = {self._after_literal(i, full=True): Cube(1 << i, 0) for i in _bits(cube.full)}
-        wanted |= {self._after_literal(i, full=False): Cube(0, 1 << i) for i in _bits(cube.empty)}
+        wanted = {self._after_literal(i, full=True): Cube(1 << i, 0) for i in bits(cube.full)}
+        wanted |= {self._after_literal(i, full=False): Cube(0, 1 << i) for i in bits(cube.empty)}
         self._renew()
         # Outside the cube, for this question only.
         here = self.session.variable(f"asked {self._asked} ")
@@ -179,7 +173,7 @@ class StepsInto:
         return None, smaller
 
     def _touching(self, cube: Cube) -> list[int]:
-        places = list(_bits(cube.full | cube.empty))
+        places = list(bits(cube.full | cube.empty))
         return sorted({t for p in places for t in (*self.net.consumers[p], *self.net.producers[p])})
 
     def _after_literal(self, p: int, *, full: bool) -> z3.BoolRef:

@@ -18,7 +18,7 @@ better asked without a list (`firable.analysis.structure.commoner`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -28,6 +28,7 @@ import z3
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.structure.asking import answer, solver_of
 from firable.analysis.structure.ordinary import Ordinary, ordinary
+from firable.nets.bits import bits
 from firable.nets.net import Marking, Net
 
 SIPHONS_MAX: Final = 2_000
@@ -141,7 +142,7 @@ def largest_siphon(net: Net, places: Marking) -> Marking:
 
     Within the empty places of a deadlock it is what ran empty.
     """
-    return _mask(siphon_rules(ordinary(net)).largest(_bits(places)))
+    return _mask(siphon_rules(ordinary(net)).largest(bits(places)))
 
 
 class Question:
@@ -188,10 +189,6 @@ def _minimal_sets(net: Net, rules: Rules, most: int, deadline: Deadline) -> Plac
             question.exclude(smallest)
     found.sort(key=lambda places: (len(places), places))
     return PlaceSets(tuple(tuple(net.places[i].name for i in places) for places in found), complete)
-
-
-def _bits(mask: Marking) -> Iterator[int]:
-    return (i for i in range(mask.bit_length()) if mask >> i & 1)
 
 
 def _mask(places: Iterable[int]) -> Marking:

@@ -26,6 +26,7 @@ from firable.analysis.question import Answer, Question, no, unknown, yes
 from firable.analysis.spaces.reachability import ReachabilityGraph
 from firable.analysis.spaces.space import WitnessError, Witnesses
 from firable.analysis.verdicts.behaviour import Behaviour
+from firable.nets.bits import bits
 from firable.nets.net import Marking, Net
 from firable.nets.time_limits import only_after_a_timeout, waiting_for_a_timer
 from firable.nets.verdict import Verdict, Weight, Witness
@@ -131,10 +132,7 @@ class Enabled:
         """What may fire in the next marking of the run."""
         changed, again = self.marking ^ marking, set[int]()
         self.marking = marking
-        while changed:
-            bit = changed & -changed
-            changed ^= bit
-            place = bit.bit_length() - 1
+        for place in bits(changed):
             self.changes[place] += 1
             again |= self.watched[place]
             self.watched[place].clear()
@@ -150,12 +148,7 @@ class Enabled:
         self.transitions.discard(t)
         of = self.net.masks[t]
         wrong = ((of.inputs | of.permissive) & ~self.marking) | ((of.outputs | of.inhibitive) & self.marking)
-        places = []
-        while wrong:
-            bit = wrong & -wrong
-            wrong ^= bit
-            places.append(bit.bit_length() - 1)
-        self.watched[min(places, key=lambda place: self.changes[place])].add(t)
+        self.watched[min(bits(wrong), key=lambda place: self.changes[place])].add(t)
 
 
 def scan(net: Net, valuations: Iterable[Mapping[str, bool]]) -> tuple[tuple[str, ...], ...]:

@@ -47,7 +47,7 @@ from typing import Self
 from firable.executor.protocol.above import Above, Promise, union
 from firable.executor.protocol.commands import Answer, Commands
 from firable.executor.protocol.deciders import closed_key, coordinator_at, coordinators
-from firable.executor.protocol.enabled import EnabledSet, bits
+from firable.executor.protocol.enabled import EnabledSet
 from firable.executor.protocol.messages import (
     EPOCH_BITS,
     Acknowledgement,
@@ -69,6 +69,7 @@ from firable.executor.protocol.restored import restore
 from firable.executor.protocol.stored_word import Piece, changed_pieces, kept_of
 from firable.executor.protocol.timers import Timers
 from firable.executor.protocol.token_player import Arbiter, Compiled, SignalAt, TokenPlayer, Word
+from firable.nets.bits import bits
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Marking, SignalKind
 

@@ -21,6 +21,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from copy import copy
 from typing import Final, Self
 
+from firable.nets.bits import bits
+
 Word = int
 Literal = int
 """A bit and a value of it: 2 i where bit i is 0, 2 i + 1 where it is 1."""
@@ -112,20 +114,6 @@ class EnabledSet:
 def literal(bit: int, *, value: bool) -> Literal:
     """The literal of a bit and a value."""
     return 2 * bit + value
-
-
-def bits(mask: int) -> Iterator[int]:
-    """The positions of the bits that are set, from the lowest.
-
-    >>> list(bits(0b1010))
-    [1, 3]
-    """
-    at = -1
-    while mask:
-        skipped = (mask & -mask).bit_length()
-        at += skipped
-        yield at
-        mask >>= skipped  # after the first, neighbours are found in a few digits, however wide the mask was
 
 
 def first_behind(mask: int, last: int) -> int:

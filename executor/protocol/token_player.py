@@ -18,8 +18,9 @@ from functools import cached_property, lru_cache
 from types import MappingProxyType
 from typing import Final, Self
 
-from firable.executor.protocol.enabled import Literal, bits, bits_behind, first_behind, literal
+from firable.executor.protocol.enabled import Literal, bits_behind, first_behind, literal
 from firable.executor.protocol.stored_word import Piece, pieces_of
+from firable.nets.bits import bits
 from firable.nets.decomposition import ArbitrationGroup
 from firable.nets.net import Marking, Net, Place, SignalKind
 from firable.semantics.arbitration import Arbitration, Group, Turns

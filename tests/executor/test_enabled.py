@@ -16,9 +16,10 @@ from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.situation import is_deadlock
 from firable.executor.protocol import enabled
 from firable.executor.protocol.controller import LocalController
-from firable.executor.protocol.enabled import EnabledSet, bits
+from firable.executor.protocol.enabled import EnabledSet
 from firable.executor.protocol.messages import Firing
 from firable.executor.protocol.token_player import Arbiter, TokenPlayer
+from firable.nets.bits import bits
 from firable.nets.decomposition import ArbitrationGroup
 from firable.nets.net import Arbiter as NetArbiter
 from firable.nets.net import ArbitrationRule, Controller, Net, Place, Transition

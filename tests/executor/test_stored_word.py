@@ -10,9 +10,10 @@ from support.examples import examples
 from firable.decompose.splitting.cut import split
 from firable.executor.journal.journal import MemoryJournal
 from firable.executor.protocol.controller import LocalController
-from firable.executor.protocol.enabled import bits, bits_behind
+from firable.executor.protocol.enabled import bits_behind
 from firable.executor.protocol.messages import Keep
 from firable.executor.protocol.stored_word import PIECE_BITS, changed_pieces, pieces, stored_word
+from firable.nets.bits import bits
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Controller, Net, Place, Transition
 

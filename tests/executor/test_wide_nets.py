@@ -11,11 +11,12 @@ from firable.decompose.splitting.cut import split
 from firable.executor.journal.journal import MemoryJournal
 from firable.executor.protocol import enabled
 from firable.executor.protocol.controller import LocalController
-from firable.executor.protocol.enabled import WIDE_BITS, bits
+from firable.executor.protocol.enabled import WIDE_BITS
 from firable.executor.protocol.messages import Decision, Effect, Keep, ProtocolError, VoteRequest
 from firable.executor.protocol.stored_word import PIECE_BITS, pieces, stored_word
 from firable.executor.simulation.campaign import Run, campaign
 from firable.executor.simulation.judge import Subject
+from firable.nets.bits import bits
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Net, Place
 

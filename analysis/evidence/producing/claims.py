@@ -49,6 +49,7 @@ from firable.analysis.spaces.reachability import ReachabilityGraph
 from firable.analysis.spaces.space import StateSpace
 from firable.analysis.verdicts.fair_runs import fair_markings
 from firable.analysis.verdicts.unanswered import unanswered
+from firable.nets.bits import bits
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import Firable, Formula
 from firable.nets.net import Marking, Net
@@ -214,9 +215,7 @@ class Certifier:
             return self._never_on(spaces.graph, spaces.markings, way, spelled)
         if self.spaces.symbolic is not None:
             symbolic = self.spaces.symbolic
-            after = symbolic.engine.forward(
-                symbolic.engine.single([i for i in range(marking.bit_length()) if marking >> i & 1])
-            )
+            after = symbolic.engine.forward(symbolic.engine.single(list(bits(marking))))
             if after & symbolic.satisfying(goal):
                 return None
             found = Continuation(way.firings, Labelling(_alone(drawn(symbolic, [after]))))
