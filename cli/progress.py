@@ -20,16 +20,35 @@ SILENT_SECONDS: Final = 1.0
 EVERY_SECONDS: Final = 0.2
 
 
-class ProgressLine:
+class _Line:
+    """A line that is written over itself, and wiped in the end."""
+
+    def __init__(self, stream: TextIO, clock: Callable[[], float]) -> None:
+        self._stream = stream
+        self._clock = clock
+        self._began = clock()
+        self._width = 0
+
+    def _write(self, line: str) -> None:
+        self._stream.write(f"\r{line.ljust(self._width)}")
+        self._stream.flush()
+        self._width = len(line)
+
+    def wipe(self) -> None:
+        """Take the line off the terminal."""
+        if self._width:
+            self._stream.write(f"\r{' ' * self._width}\r")
+            self._stream.flush()
+            self._width = 0
+
+
+class ProgressLine(_Line):
     """Writes how many markings and edges were found: over itself on a terminal, else line by line; for any thread."""
 
     def __init__(self, stream: TextIO, clock: Callable[[], float] = monotonic) -> None:
-        self._stream = stream
-        self._clock = clock
+        super().__init__(stream, clock)
         self._is_terminal = stream.isatty()
-        self._began = clock()
         self._next = self._began + SILENT_SECONDS
-        self._width = 0
         self._turn = Lock()
 
     def __call__(self, n_markings: int, n_edges: int) -> None:
@@ -45,19 +64,10 @@ class ProgressLine:
             self._next = now + (EVERY_SECONDS if self._is_terminal else 10 * EVERY_SECONDS)
             line = f"  {words}, {now - self._began:.0f} s"
             if self._is_terminal:
-                line = line[: get_terminal_size().columns - 1]  # of a line that is broken the rest could not be wiped
-                self._stream.write(f"\r{line.ljust(self._width)}")
-                self._width = len(line)
+                self._write(line[: get_terminal_size().columns - 1])  # the rest of a broken line could not be wiped
             else:
                 self._stream.write(f"{line}\n")
-            self._stream.flush()
-
-    def wipe(self) -> None:
-        """Take the line off the terminal."""
-        if self._width:
-            self._stream.write(f"\r{' ' * self._width}\r")
-            self._stream.flush()
-            self._width = 0
+                self._stream.flush()
 
 
 @contextmanager
@@ -73,15 +83,12 @@ def progress_line(wanted: bool | None) -> Generator[ProgressLine | None]:
         line.wipe()
 
 
-class Stages:
+class Stages(_Line):
     """Writes what is being done and for how long, where the work itself counts nothing: over itself, on a terminal."""
 
     def __init__(self, stream: TextIO, clock: Callable[[], float] = monotonic) -> None:
-        self._stream = stream
-        self._clock = clock
-        self._began = clock()
+        super().__init__(stream, clock)
         self._words = ""
-        self._width = 0
 
     def __call__(self, words: str) -> None:
         """Say what is done from now on."""
@@ -92,17 +99,7 @@ class Stages:
         seconds = self._clock() - self._began
         if seconds < SILENT_SECONDS or not self._words:
             return
-        line = f"  {self._words}, {seconds:.0f} s"
-        self._stream.write(f"\r{line.ljust(self._width)}")
-        self._stream.flush()
-        self._width = len(line)
-
-    def wipe(self) -> None:
-        """Take the line off the terminal."""
-        if self._width:
-            self._stream.write(f"\r{' ' * self._width}\r")
-            self._stream.flush()
-            self._width = 0
+        self._write(f"  {self._words}, {seconds:.0f} s")
 
 
 @contextmanager
