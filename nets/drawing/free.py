@@ -28,7 +28,7 @@ from firable.nets.drawing.xml import esc, head, ident, px
 from firable.nets.net import Marking, Net
 
 _LINE: Final = 14.0
-_SIGNAL: Final = Style("signal", 10.5, 6.5)
+_SIGNAL: Final = Style("signal", 6.5)
 _NOTE_CHARACTERS: Final = 20
 _HALO: Final = "text{paint-order:stroke;stroke:#fff;stroke-width:3px;stroke-linejoin:round}"
 """Words are read over a line that a layouter leads to the side of a box."""

@@ -33,7 +33,7 @@ _MARGIN: Final = 24.0
 _GAP: Final = 18.0
 _WIDTH_MAX: Final = 2400.0
 """How wide the markings of one distance may stand, in pixels, before they go on in the next row."""
-_FIRING: Final = Style("firing", 11.0, 7.0)
+_FIRING: Final = Style("firing", 7.0)
 
 _STYLE: Final = """
 .name{font-size:13px;font-weight:600}

@@ -13,16 +13,15 @@ from unicodedata import east_asian_width
 
 @dataclass(frozen=True, slots=True)
 class Style:
-    """How a line of text looks: a class of the style sheet, its size, and the mean width of a character."""
+    """How a line of text looks: a class of the style sheet, which has its size, and the mean width of a character."""
 
     css: str
-    size_px: float
     character_px: float
 
 
-NAME: Final = Style("name", 13.0, 8.0)
-COMMAND: Final = Style("command", 10.5, 6.5)
-NOTE: Final = Style("note", 10.5, 6.1)
+NAME: Final = Style("name", 8.0)
+COMMAND: Final = Style("command", 6.5)
+NOTE: Final = Style("note", 6.1)
 
 
 Words = tuple[tuple[str, Style], ...]
