@@ -76,11 +76,6 @@ def decide_stated(space: StateSpace[Any], of: Property | TemporalProperty) -> Ve
     return decide_temporal(space, of) if isinstance(of, TemporalProperty) else decide_property(space, of)
 
 
-def decide_properties(space: StateSpace[Any]) -> tuple[Verdict, ...]:
-    """The verdicts on all properties of the net, in the order of the file."""
-    return tuple(decide_stated(space, of) for of in space.net.properties)
-
-
 def _invariant(space: StateSpace[Any], of: Property, *, violating: bool) -> Answer:
     bad = of.formula if violating else Not(of.formula)
     note = f"here ({format_formula(of.formula)}) {'holds' if violating else 'does not hold'}"

@@ -16,7 +16,7 @@ from firable.analysis.temporal.automaton import TimeEndedError, TooLargeError, a
 from firable.analysis.temporal.queries import answer, as_goal, upper_bound
 from firable.analysis.temporal.rewriting import positive
 from firable.analysis.verdicts.goals import goals_of
-from firable.analysis.verdicts.properties import decide_properties
+from firable.analysis.verdicts.properties import decide_stated
 from firable.decompose import split
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.net import ExternalGate, Net, Place, Signal, TemporalProperty, Transition
@@ -179,7 +179,8 @@ def test_a_net_states_properties_in_both_logics() -> None:
     added += "  never_two: {ltl: G not deadlock}\n  some: {ctl: EF deadlock}\n"
     assert "\nproperties:\n" in text
     net = parse_net(f"{text}\n{added}")
-    verdicts = {verdict.name: verdict for verdict in decide_properties(explore(net))}
+    space = explore(net)
+    verdicts = {verdict.name: verdict for verdict in (decide_stated(space, of) for of in net.properties)}
     for name in ("back", "once", "never_two"):
         verdict = verdicts[f"property.{name}"]
         assert (verdict.status, verdict.weight) == (Status.VIOLATED, Weight.REQUIRED)

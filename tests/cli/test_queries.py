@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from firable.analysis.spaces.reachability import explore
-from firable.analysis.verdicts.properties import decide_properties
+from firable.analysis.verdicts.properties import decide_stated
 from firable.cli.main import main
 from firable.nets.formula import parse_formula
 from firable.nets.text import parse_net
@@ -22,7 +22,8 @@ def example(kind: str) -> str:
 
 
 def test_the_net_of_the_page_has_the_properties_that_it_states() -> None:
-    verdicts = decide_properties(explore(parse_net(example("yaml"))))
+    space = explore(parse_net(example("yaml")))
+    verdicts = [decide_stated(space, of) for of in space.net.properties]
     assert [(verdict.name, verdict.status) for verdict in verdicts] == [
         ("property.again", Status.PROVED),
         ("property.in_turn", Status.PROVED),
