@@ -103,6 +103,12 @@ class ChannelDocument(_Model):
         """The point by which a command is given."""
         return str(self.number or self.command or self.request)
 
+    @property
+    def shows(self) -> dict[Point, str]:
+        """The points that are read, and of what."""
+        keys = {"taken": self.taken, "done": self.done, "failed": self.failed}
+        return {point: key for key, point in keys.items() if point is not None}
+
 
 class DeviceDocument(_Model):
     """One device: its kind, its channels, its safe outputs; the other keys are of its kind."""

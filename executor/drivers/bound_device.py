@@ -77,7 +77,7 @@ class BoundDevice:
             self.channels[channel_name] = made(body, places, driver.answered)
         self.replies: dict[Point, list[tuple[Channel | Handshake, str]]] = {}
         for channel in self.channels.values():
-            for point, key in channel.points().items():
+            for point, key in channel.document.shows.items():
                 self.replies.setdefault(point, []).append((channel, key))
         heartbeat, alive = self.document.heartbeat, self.document.alive
         self.tripped = None if heartbeat is None else heartbeat.tripped
@@ -236,7 +236,7 @@ class BoundDevice:
         unread = [name for name, reading in self.image.readings.items() if not reading.at_seconds]
         silent = [f"'{name}' (at {self.image.signals[name].read})" for name in sorted(unread)]
         for name, channel in self.channels.items():
-            unsaid = {key: point for point, key in channel.points().items() if key not in channel.shown}
+            unsaid = {key: point for point, key in channel.document.shows.items() if key not in channel.shown}
             silent += [f"what '{name}' has {key} (at {point})" for key, point in unsaid.items()]
         return f"{self.name} has never shown {', '.join(silent)}" if self.is_overdue and silent else ""
 
@@ -511,7 +511,7 @@ class BoundDevice:
 
 def _given(channel: Channel | Handshake, order: Order) -> str:
     """An order, and where it was written and would be shown."""
-    shown = ", ".join(channel.points())
+    shown = ", ".join(channel.document.shows)
     return f"'{order.text}' of '{order.place}' (written at {channel.document.asks}, shown at {shown})"
 
 

@@ -31,7 +31,7 @@ from enum import Enum, auto
 from typing import Final
 
 from firable.executor.drivers.binding import ChannelDocument
-from firable.executor.drivers.device import Point, Value, Writes, as_number
+from firable.executor.drivers.device import Value, Writes, as_number
 from firable.executor.drivers.driver import Answer
 from firable.executor.protocol.record import record
 
@@ -120,11 +120,6 @@ class Channel:
         """
         rounds = NUMBER_MAX // len(self.places)
         return 1 + (entry % rounds) * len(self.places) + self.places.index(place)
-
-    def points(self) -> dict[Point, str]:
-        """The points that are read, and of what."""
-        keys = {"taken": self.document.taken, "done": self.document.done, "failed": self.document.failed}
-        return {point: key for key, point in keys.items() if point is not None}
 
     def send(self, place: str, entry: int, text: str, writes: Writes) -> None:
         """Send a command as soon as that can be; `text` is the command as the net has it."""

@@ -26,7 +26,7 @@ from enum import Enum, auto
 
 from firable.executor.drivers.binding import ChannelDocument
 from firable.executor.drivers.channels import Order, Outcome, Said
-from firable.executor.drivers.device import Point, Value, Writes, as_bit
+from firable.executor.drivers.device import Value, Writes, as_bit
 from firable.executor.drivers.driver import Answer
 
 
@@ -68,13 +68,9 @@ class Handshake:
     def unanswered(self) -> Order | None:
         """The newest order, where the device should show by now that it has it, or has never shown all of its bits."""
         awaits = self.phase is _Phase.ASKED and not self.is_taken and self.document.taken is not None
-        is_blind = self.phase is _Phase.HELD and any(self.shown.get(key) is None for key in self.points().values())
+        known = (self.shown.get(key) is not None for key in self.document.shows.values())
+        is_blind = self.phase is _Phase.HELD and not all(known)
         return self.current if awaits or is_blind else None
-
-    def points(self) -> dict[Point, str]:
-        """The points that are read, and of what."""
-        keys = {"taken": self.document.taken, "done": self.document.done, "failed": self.document.failed}
-        return {point: key for key, point in keys.items() if point is not None}
 
     def send(self, place: str, entry: int, text: str, writes: Writes) -> None:
         """Send a command as soon as the one before is over."""
@@ -168,7 +164,7 @@ class Handshake:
 
     def _is_idle(self) -> bool:
         """Whether the device shows nothing of an earlier command."""
-        return all(self.shown.get(key) == 0 for key in self.points().values())
+        return all(self.shown.get(key) == 0 for key in self.document.shows.values())
 
     def _let_go(self) -> None:
         """Let the request of a command that was given up fall, once the device will show what it makes of that."""
