@@ -17,8 +17,9 @@ firable.analysis.check import check` chooses among these and all other technique
 The names are loaded when they are asked for: numpy and z3 take a second, and belong to the extra `prove`.
 """
 
-from importlib import import_module
 from typing import TYPE_CHECKING, Final
+
+from firable.nets.lazy import loaded_when_asked
 
 if TYPE_CHECKING:
     from firable.analysis.deadline import Deadline
@@ -65,17 +66,9 @@ _MODULES: Final = {
     "structure.siphons": ("minimal_siphons", "minimal_traps"),
     "verdicts.starvation": ("eager_run",),
 }
-_MODULE_OF: Final = {name: module for module, names in _MODULES.items() for name in names}
-
 
 if not TYPE_CHECKING:  # type checkers read the imports above, and so see a name that is misspelt
-
-    def __getattr__(name: str) -> object:
-        if name not in _MODULE_OF:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        value = getattr(import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
-        globals()[name] = value
-        return value
+    __getattr__ = loaded_when_asked(__name__, _MODULES)
 
 
 def __dir__() -> list[str]:

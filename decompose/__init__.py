@@ -18,8 +18,9 @@ The names are loaded when they are asked for, so that what checks a bundle (`ver
 nothing of what made it.
 """
 
-from importlib import import_module
 from typing import TYPE_CHECKING, Final
+
+from firable.nets.lazy import loaded_when_asked
 
 if TYPE_CHECKING:
     from firable.decompose.bundling import make_bundle
@@ -50,17 +51,9 @@ _MODULES: Final = {
     "splitting.cut": ("split",),
     "splitting.table": ("table_text",),
 }
-_MODULE_OF: Final = {name: module for module, names in _MODULES.items() for name in names}
-
 
 if not TYPE_CHECKING:  # type checkers read the imports above, and so see a name that is misspelt
-
-    def __getattr__(name: str) -> object:
-        if name not in _MODULE_OF:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        value = getattr(import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
-        globals()[name] = value
-        return value
+    __getattr__ = loaded_when_asked(__name__, _MODULES)
 
 
 def __dir__() -> list[str]:

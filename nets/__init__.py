@@ -23,8 +23,9 @@ To pass on: a `Verdict` has a `Status`, never a bare Boolean, a `Weight` and per
 The names are loaded when they are asked for: who needs the records alone loads neither YAML nor pydantic.
 """
 
-from importlib import import_module
 from typing import TYPE_CHECKING, Final
+
+from firable.nets.lazy import loaded_when_asked
 
 if TYPE_CHECKING:
     from firable.nets.bundle import Bundle, read_bundle, write_bundle
@@ -130,17 +131,9 @@ _MODULES: Final = {
     "text": ("parse_net", "read_net"),
     "verdict": ("Status", "Verdict", "Weight", "Witness"),
 }
-_MODULE_OF: Final = {name: module for module, names in _MODULES.items() for name in names}
-
 
 if not TYPE_CHECKING:  # type checkers read the imports above, and so see a name that is misspelt
-
-    def __getattr__(name: str) -> object:
-        if name not in _MODULE_OF:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        value = getattr(import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
-        globals()[name] = value
-        return value
+    __getattr__ = loaded_when_asked(__name__, _MODULES)
 
 
 def __dir__() -> list[str]:
