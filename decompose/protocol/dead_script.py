@@ -38,7 +38,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
-from firable.analysis.induction.smt import Answer, in_ascii, symbol
+from firable.analysis.induction.smt import Answer, symbol
 from firable.decompose.proofs.script import LOGIC, Reader
 from firable.decompose.protocol.bereft import Bereft, deaths, moved_beside
 from firable.decompose.protocol.building import ProtocolNet, protocol_net
@@ -61,8 +61,11 @@ from firable.decompose.protocol.inductive_script import (
     after,
     all_of,
     any_of,
+    declared,
+    defined,
     fired_by_its_way,
     literal,
+    obligation,
     sentence,
 )
 from firable.decompose.protocol.parts import Part, Parts
@@ -70,15 +73,9 @@ from firable.decompose.protocol.rounds import committed, decided, is_open
 from firable.decompose.protocol.variant import ANY_FAULTS, PROTOCOL
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Transition
-from firable.nets.source import printable
 
 FILE: Final = "dead.smt2"
 STANDING: Final = "|a promise stands|"
-_HEAD: Final = (
-    "Each block asserts that its sentence does not hold, so the answer `unsat` proves it.",
-    "The constants: a place of the protocol's net holds a token; `let` says what a step changes.",
-    "To check it with another solver: cvc5 --incremental FILE, or z3 FILE; every name is followed by `unsat`.",
-)
 SAYS: Final = {
     "starts": "at the start, the invariant holds, and promises stand",
     "keeps": "after the step, they still do",
@@ -114,25 +111,19 @@ class DeadObligations:
         """The head of the file, up to the first obligation."""
         protocol = self.protocol
         says = f"dead of the protocol of '{protocol.parts.net.name}': what goes on without the dead goes on in it"
-        lines = [f"; {printable(line)}" for line in (says, *_HEAD)]
-        places = sorted(place.name for place in protocol.net.places)
-        lines += [LOGIC, *(f"(declare-const {symbol(place)} Bool)" for place in places)]
-        defined = {
-            INVARIANT: all_of(map(sentence, self._rounds.invariant)),
-            STANDING: all_of(map(sentence, self._standing)),
-        }
-        defined |= {name: sentence(fact) for fact, name in self._rounds.facts.items()}
-        defined |= {self._open(group): any_of(map(symbol, self._memory(group))) for group in self._groups}
-        lines += [f"(define-fun {name} () Bool {text})" for name, text in defined.items()]
+        lines = declared(protocol, says, LOGIC)
+        lines.append(defined(INVARIANT, all_of(map(sentence, self._rounds.invariant))))
+        lines.append(defined(STANDING, all_of(map(sentence, self._standing))))
+        lines += [defined(name, sentence(fact)) for fact, name in self._rounds.facts.items()]
+        lines += [defined(self._open(group), any_of(map(symbol, self._memory(group)))) for group in self._groups]
         if self._rounds.given:
-            votes = all_of(map(sentence, persistent(protocol)))
-            lines += [GIVEN, f"(define-fun {PERSISTENT} () Bool {votes})"]
+            lines += [GIVEN, defined(PERSISTENT, all_of(map(sentence, persistent(protocol))))]
         return "\n".join(lines) + "\n"
 
     def blocks(self) -> Iterator[tuple[str, str]]:
         """Each obligation by its name. From the second one on, promises stand."""
         marked = all_of(literal((place.name, place.marked)) for place in self.protocol.net.places)
-        name, block = _block("starts", "starts", [marked, f"(not (and {INVARIANT} {STANDING}))"])
+        name, block = _block("starts", [marked, f"(not (and {INVARIANT} {STANDING}))"])
         yield name, f"{block}\n(assert {INVARIANT})\n(assert {STANDING})\n{self._rounds.given}"
         for made in (self._keeping(), self._home(), self._leading(), self._ways()):
             yield from made
@@ -208,7 +199,7 @@ class DeadObligations:
             changes = effect(t)
             goals = [texts[one] for of in changes.items() for one in at_[negated(of)]]
             asserted = [all_of(map(literal, demands(t))), f"(not {after(changes, all_of(goals))})"]
-            yield _block(f"keeps.{t.name}", "keeps", asserted)
+            yield _block(f"keeps.{t.name}", asserted)
 
     def _home(self) -> Iterator[tuple[str, str]]:
         steps = list(homeward(self.protocol))
@@ -220,11 +211,11 @@ class DeadObligations:
                 if not its.isdisjoint((*one.step.inputs, *one.step.outputs))
             ]
             alive = all_of(literal((place, False)) for t in group for place in self._downs(t))
-            yield _block(f"home.{'+'.join(group)}", "home", [self._open(group), alive, f"(not {any_of(ends)})"])
+            yield _block(f"home.{'+'.join(group)}", [self._open(group), alive, f"(not {any_of(ends)})"])
 
     def _leading(self) -> Iterator[tuple[str, str]]:
         for name, asserted in self._rounds.leading():
-            yield _block(name, "homeward", asserted)
+            yield _block(name, asserted)
 
     def _ways(self) -> Iterator[tuple[str, str]]:
         parts = self.protocol.parts
@@ -235,7 +226,7 @@ class DeadObligations:
             free += [f"(not {obstacle})" for obstacle in self._in_the_way(t.name)]
             if t.name in parts.coordinated:
                 free.append(f"(not {self._open(parts.groups[parts.group_of[t.name]])})")
-            yield _block(f"way.{t.name}", "way", [all_of(can), all_of(free), f"(not {fired})"])
+            yield _block(f"way.{t.name}", [all_of(can), all_of(free), f"(not {fired})"])
 
     def _of_one(self, bereft: Bereft) -> Iterator[tuple[str, str]]:
         who, parts, net = bereft.verdict, self.protocol.parts, self.protocol.net
@@ -243,7 +234,7 @@ class DeadObligations:
         dead = symbol(is_down)
         firing = [u for u in net.transitions if self.protocol.steps[u.name].fires in bereft.at_once]
         if firing:
-            yield _block(f"at-once.{who}", "at-once", [dead, any_of(all_of(map(literal, demands(u))) for u in firing)])
+            yield _block(f"at-once.{who}", [dead, any_of(all_of(map(literal, demands(u))) for u in firing)])
         at_rest = [f"(not {self._open(group)})" for group in parts.groups if bereft.rests(group)]
         others = [*(down(subnet.name) for subnet in self.decomposition.subnets), *map(coordinator_down, parts.deciders)]
         alive = [literal((place, False)) for place in others if place != is_down]
@@ -256,12 +247,12 @@ class DeadObligations:
             kept.append(all_of([*seen, any_of(ways)]))
         if kept:
             asserted = [dead, all_of([*at_rest, *alive]), any_of(kept)]
-            yield _block(f"undisturbed.{who}", "undisturbed", asserted)
+            yield _block(f"undisturbed.{who}", asserted)
         for part in sorted(bereft.left, key=lambda part: f"{part.whole}/{part.controller}"):
             name = f"{part.whole}/{part.controller}"
             acts = ("behind",) if bereft.is_free(part) else ("behind", "hold")
             may = [self._guard(bereft.net.transition(f"{act}/{name}"), held) for act in acts]
-            yield _block(f"promised.{who}.{name}", "promised", [self._left(part), f"(not {any_of(may)})"])
+            yield _block(f"promised.{who}.{name}", [self._left(part), f"(not {any_of(may)})"])
 
     def _guard(self, t: Transition, held: dict[str, str]) -> str:
         """Where a transition of the net that is left may fire, said of the protocol's net."""
@@ -270,9 +261,8 @@ class DeadObligations:
         return all_of([*full, *(f"(not {of[place]})" for place in t.inhibitive if place in of)])
 
 
-def _block(name: str, kind: str, asserted: Iterable[str]) -> tuple[str, str]:
-    lines = [f"; {SAYS[kind]}", "(push 1)", f'(echo "{in_ascii(name)}")', *(f"(assert {text})" for text in asserted)]
-    return name, "\n" + "\n".join([*lines, "(check-sat)", "(pop 1)"]) + "\n"
+def _block(name: str, asserted: Iterable[str]) -> tuple[str, str]:
+    return name, obligation(SAYS, name, asserted)
 
 
 @dataclass(frozen=True)

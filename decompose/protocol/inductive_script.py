@@ -139,6 +139,25 @@ def fired_by_its_way(protocol: ProtocolNet, t: str) -> str:
     return text
 
 
+def declared(protocol: ProtocolNet, says: str, logic: str) -> list[str]:
+    """The lines with which a file on a protocol net begins: what it says, and a constant for each place."""
+    places = sorted(place.name for place in protocol.net.places)
+    comments = (f"; {printable(line)}" for line in (says, *_HEAD))
+    return [*comments, logic, *(f"(declare-const {symbol(place)} Bool)" for place in places)]
+
+
+def defined(name: str, text: str) -> str:
+    """The line that defines a formula by its name."""
+    return f"(define-fun {name} () Bool {text})"
+
+
+def obligation(kinds: Mapping[str, str], name: str, asserted: Iterable[str]) -> str:
+    """One obligation; the word before the first point of its name is its kind."""
+    lines = [f"; {kinds[name.partition('.')[0]]}", "(push 1)", f'(echo "{in_ascii(name)}")']
+    lines += [f"(assert {text})" for text in asserted]
+    return "\n" + "\n".join([*lines, "(check-sat)", "(pop 1)"]) + "\n"
+
+
 @dataclass(frozen=True)
 class Obligations:
     """The obligations on one protocol net; under faults those on its tokens and on what is busy for ever are left out.
@@ -180,20 +199,18 @@ class Obligations:
         family = "faults" if protocol.faults else "explored"
         under = ", under faults" if protocol.faults else ""
         says = f"{family} of the protocol of '{protocol.parts.net.name}'{under}: it does what the central net does"
-        lines = [f"; {printable(line)}" for line in (says, *_HEAD)]
-        places = sorted(place.name for place in protocol.net.places)
-        lines += [LOGIC, *(f"(declare-const {symbol(place)} Bool)" for place in places)]
-        lines.append(_defined(INVARIANT, all_of(map(sentence, self.invariant))))
+        lines = declared(protocol, says, LOGIC)
+        lines.append(defined(INVARIANT, all_of(map(sentence, self.invariant))))
         if self.given:
-            lines += [GIVEN, _defined(PERSISTENT, all_of(map(sentence, persistent(protocol))))]
-        lines.append(_defined(OPEN, self._open))
-        lines += [_defined(name, sentence(fact)) for fact, name in self.facts.items()]
+            lines += [GIVEN, defined(PERSISTENT, all_of(map(sentence, persistent(protocol))))]
+        lines.append(defined(OPEN, self._open))
+        lines += [defined(name, sentence(fact)) for fact, name in self.facts.items()]
         return "\n".join(lines) + "\n"
 
     def starts(self) -> str:
         """The one obligation of which the invariant is not assumed."""
         literals = ((place.name, place.marked) for place in self.protocol.net.places)
-        return _block("starts", "starts", [all_of(map(literal, literals)), f"(not {INVARIANT})"])
+        return _block("starts", [all_of(map(literal, literals)), f"(not {INVARIANT})"])
 
     def blocks(self) -> Iterator[str]:
         """The other obligations."""
@@ -204,7 +221,7 @@ class Obligations:
         yield from self._home()
         yield from self._ways()
         if not self.protocol.faults:
-            yield _block("divergence", "divergence", [f"(not {all_of(self._falling())})"])
+            yield _block("divergence", [f"(not {all_of(self._falling())})"])
 
     def _keeping(self) -> Iterator[str]:
         texts, at = {one: sentence(one) for one in self.invariant}, touched(self.invariant)
@@ -212,13 +229,13 @@ class Obligations:
             changes = effect(t)
             goals = (texts[one] for of in changes.items() for one in at[negated(of)])
             asked = [all_of(map(literal, demands(t))), f"(not {after(changes, all_of(goals))})"]
-            yield _block(f"keeps.{t.name}", "keeps", asked)
+            yield _block(f"keeps.{t.name}", asked)
 
     def _safe(self) -> Iterator[str]:
         parts = self.protocol.parts
-        yield _block("follows", "follows", [symbol(ASTRAY)])
+        yield _block("follows", [symbol(ASTRAY)])
         closed = [literal((decided(parts, group[0]), False)) for group in parts.groups]
-        yield _block("agrees", "agrees", [all_of(closed), self._differs])
+        yield _block("agrees", [all_of(closed), self._differs])
         unfit = []
         for part in (part for its in parts.coordinated.values() for part in its):
             wrong = [(place, False) for place in (*part.inputs, *part.permissive)]
@@ -230,7 +247,7 @@ class Obligations:
                 there[1] = (at("obeyed", part), False)
             unfit.append(all_of([*map(literal, there), any_of(map(literal, wrong))]))
         if unfit:
-            yield _block("orders-fit", "orders-fit", [any_of(unfit)])
+            yield _block("orders-fit", [any_of(unfit)])
 
     @cached_property
     def _differs(self) -> str:
@@ -251,7 +268,7 @@ class Obligations:
                 given.append(f"(not {self._contact(self.protocol.parts.net.transition(fires))})")
                 given += [f"(not {underway})" for place in t.outputs for underway in taking.get(place, ())]
             if t.outputs:
-                yield _block(f"one-token.{t.name}", "one-token", [all_of(given), any_of(map(symbol, t.outputs))])
+                yield _block(f"one-token.{t.name}", [all_of(given), any_of(map(symbol, t.outputs))])
 
     def _contact(self, t: Transition) -> str:
         """The central net has contact at a transition."""
@@ -270,9 +287,9 @@ class Obligations:
     def _home(self) -> Iterator[str]:
         ceased = list(map(literal, may_go_on(self.protocol)))
         possible = [all_of(map(literal, (*demands(one.step), *one.where))) for one in homeward(self.protocol)]
-        yield _block("home", "home", [*ceased, OPEN, f"(not {any_of(possible)})"])
+        yield _block("home", [*ceased, OPEN, f"(not {any_of(possible)})"])
         for name, asked in self.leading():
-            yield _block(name, "homeward", asked)
+            yield _block(name, asked)
 
     def leading(self) -> Iterator[tuple[str, list[str]]]:
         """Of each step homeward that it leaves less to be done: the name, and what is asserted, over `facts`."""
@@ -292,7 +309,7 @@ class Obligations:
         for t in sorted(self.protocol.parts.transitions, key=lambda t: t.name):
             fired = fired_by_its_way(self.protocol, t.name)
             can = all_of(literal((central(place), full)) for place, full in demands(t))
-            yield _block(f"way.{t.name}", "way", [*ceased, can, f"(not {OPEN})", f"(not {fired})"])
+            yield _block(f"way.{t.name}", [*ceased, can, f"(not {OPEN})", f"(not {fired})"])
 
     def _falling(self) -> Iterator[str]:
         weight = weights(self.protocol)
@@ -307,13 +324,8 @@ class Obligations:
                 yield f"(< {heavy(t.outputs)} {heavy(t.inputs)})"
 
 
-def _defined(name: str, text: str) -> str:
-    return f"(define-fun {name} () Bool {text})"
-
-
-def _block(name: str, kind: str, asserted: Iterable[str]) -> str:
-    lines = [f"; {SAYS[kind]}", "(push 1)", f'(echo "{in_ascii(name)}")', *(f"(assert {text})" for text in asserted)]
-    return "\n" + "\n".join([*lines, "(check-sat)", "(pop 1)"]) + "\n"
+def _block(name: str, asserted: Iterable[str]) -> str:
+    return obligation(SAYS, name, asserted)
 
 
 @dataclass(frozen=True)
