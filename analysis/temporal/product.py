@@ -76,30 +76,23 @@ class Product(Generic[S]):
         """The pairs from which a pair of the goal can be reached."""
         found = Steps(self, {})
         for part in self.parts:
-            self._close(found, part, {state: goal.get(state, self.sets.none) for state in part}, None)
+            self._close(found, part, {state: goal.get(state, self.sets.none) for state in part})
         return found.pairs
 
-    def _close(
-        self, found: Steps[S], states: Iterable[int], goal: Pairs[S], within: Pairs[S] | None, *, inside: bool = False
-    ) -> None:
-        """Add to what is found the pairs of these states that lead to the goal or to what is found already.
-
-        With `inside` they lead there by edges between these states alone.
-        """
-        part = set(states)
-        edges = {q: [edge for edge in self.edges[q] if not inside or edge.target in part] for q in part}
+    def _close(self, found: Steps[S], part: tuple[int, ...], goal: Pairs[S], within: Pairs[S] | None = None) -> None:
+        """Add to what is found the pairs of these states that lead, within some, to the goal or to what was found."""
         for state in part:
             found.put(state, goal[state])
-        waiting = dict.fromkeys(states)
+        waiting = dict.fromkeys(part)
         while waiting:
             state = next(iter(waiting))
             del waiting[state]
-            old, steps = found.pairs[state], found.into(edges[state])
+            old, steps = found.pairs[state], found.into(self.edges[state])
             base = self.sets.either(old, steps if within is None else self.sets.both(steps, within[state]))
             new = self._through(state, base, within)
             if self.sets.space.count(new) != self.sets.space.count(old):
                 found.put(state, new)
-                waiting.update(dict.fromkeys(q for q in part if any(edge.target == state for edge in edges[q])))
+                waiting.update(dict.fromkeys(q for q in part if any(edge.target == state for edge in self.edges[q])))
 
     def _through(self, state: int, targets: S, within: Pairs[S] | None) -> S:
         """The markings that lead to the targets while the automaton stays in the state, whatever fires."""
@@ -135,7 +128,7 @@ class Product(Generic[S]):
             size = now
             for mark in missing:
                 closed = Steps(self, {})
-                self._close(closed, part, self._step(own, pairs, mark), pairs, inside=True)
+                self._close(closed, part, self._step(own, pairs, mark), pairs)
                 pairs = closed.pairs
             if not missing:
                 pairs = self._step(own, pairs, None)
