@@ -23,6 +23,8 @@ Subject = tuple[str, ...]
 
 DIAGNOSTICS_MAX: Final = 80
 """So many problems of one input are shown."""
+PROBLEMS_MAX: Final = 100
+"""So many are looked for: enough to join and to read, where a file of noise has millions."""
 
 
 class Severity(StrEnum):
@@ -221,6 +223,20 @@ class Diagnostic:
         if self.hint:
             lines.append(f"  hint: {self.hint}")
         return "\n".join(lines)
+
+
+class Problems(list[Diagnostic]):
+    """The problems of one input, as they are found: the first `PROBLEMS_MAX` of those that are reported."""
+
+    @property
+    def is_full(self) -> bool:
+        """Whether no more are kept."""
+        return len(self) >= PROBLEMS_MAX
+
+    def report(self, problem: Diagnostic) -> None:
+        """Keep one more."""
+        if not self.is_full:
+            self.append(problem)
 
 
 def bounded(problems: list[Diagnostic]) -> list[Diagnostic]:

@@ -20,17 +20,14 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 from itertools import islice
-from typing import Final
 
-from firable.nets.diagnostics import InputError
+from firable.nets.diagnostics import PROBLEMS_MAX, InputError
 from firable.nets.formula import Formula
 from firable.nets.temporal import Logic, Temporal
 from firable.nets.verdict import Expectation
 
 Marking = int
 """The set of places with a token; bit i is place i of the net."""
-
-_PROBLEMS_MAX: Final = 100  # enough to read; a file of noise has millions
 
 
 @dataclass(frozen=True, slots=True)
@@ -287,7 +284,7 @@ class Net:
     def __post_init__(self) -> None:
         from firable.nets.well_formed import problems  # here, because the rules speak of the records above
 
-        if found := list(islice(problems(self), _PROBLEMS_MAX)):
+        if found := list(islice(problems(self), PROBLEMS_MAX)):
             raise InputError(found)
 
     def __repr__(self) -> str:

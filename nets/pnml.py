@@ -22,7 +22,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
-from firable.nets.diagnostics import Diagnostic, InputError, Severity, bounded, did_you_mean
+from firable.nets.diagnostics import Diagnostic, InputError, Problems, Severity, bounded, did_you_mean
 from firable.nets.net import Net, Place, Transition
 from firable.nets.pausing import without_cycle_search
 from firable.nets.pnml_writer import write_pnml
@@ -34,7 +34,6 @@ __all__ = ["PnmlImport", "parse_pnml", "read_pnml", "write_pnml"]
 
 SIZE_BYTES_MAX: Final = 256 * 1024 * 1024
 KINDS_MAX: Final = 20
-PROBLEMS_MAX: Final = 100  # enough to read; a file of noise has millions
 
 _NORMAL: Final = frozenset({"", "normal", "timed", "arc", "ptarc", "directed", "flow", "regular", "default"})
 _READ: Final = frozenset({"read", "readarc", "test", "testarc", "activator"})
@@ -90,15 +89,15 @@ class _Import:
     def __init__(self, source: Source, records: PnmlRecords) -> None:
         self.source = source
         self.records = records
-        self.problems: list[Diagnostic] = []
+        self.problems = Problems()
         self.self_loops: list[str] = []
         self.renamed: dict[str, str] = {}
         self.capacities: list[str] = []
 
     def refuse(self, record: Record, code: str, message: str, hint: str) -> None:
-        if len(self.problems) < PROBLEMS_MAX:
+        if not self.problems.is_full:
             span = self.source.span(record.line, record.column, len(record.tag) + 1)
-            self.problems.append(Diagnostic(code, message, hint, span=span))
+            self.problems.report(Diagnostic(code, message, hint, span=span))
 
     def net(self) -> Net:
         records = self.records
@@ -196,7 +195,7 @@ class _Import:
             ends = record.attributes.get("source", ""), record.attributes.get("target", "")
             if ends[0] not in nodes or ends[1] not in nodes:
                 unknown = [end for end in ends if end not in nodes]
-                known = list(nodes) if len(self.problems) < PROBLEMS_MAX else []
+                known = [] if self.problems.is_full else list(nodes)
                 hint = did_you_mean(unknown[0], known) + "an arc names two identifiers of the file"
                 message = f"{described(record)}: there is no place or transition {quoted(unknown[0])}"
                 self.refuse(record, "F2002", message, hint)

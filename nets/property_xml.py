@@ -19,10 +19,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from firable.nets.diagnostics import Diagnostic, InputError, bounded
+from firable.nets.diagnostics import Diagnostic, InputError, Problems, bounded
 from firable.nets.formula import Compare, Constant, Count, Deadlock, Firable, Formula, FormulaError, Or, Sign
 from firable.nets.net import Net
-from firable.nets.queries import PROBLEMS_MAX, KnownNames, Query, QueryKind
+from firable.nets.queries import KnownNames, Query, QueryKind
 from firable.nets.source import Source, quoted
 from firable.nets.temporal import (
     Eventually,
@@ -88,11 +88,7 @@ class _Reading:
     def __init__(self, source: Source, net: Net, renamed: Mapping[str, str]) -> None:
         self.source, self.renamed = source, renamed
         self.known = KnownNames(net)
-        self.problems: list[Diagnostic] = []
-
-    def report(self, problem: Diagnostic) -> None:
-        if len(self.problems) < PROBLEMS_MAX:
-            self.problems.append(problem)
+        self.problems = Problems()
 
     def refuse(self, element: Element, message: str) -> InputError:
         span = self.source.span(element.line, element.column, len(element.tag) + 1)
@@ -107,12 +103,12 @@ class _Reading:
                 query = self.query(element)
             except InputError as error:
                 for problem in error.diagnostics:
-                    self.report(problem)
+                    self.problems.report(problem)
                 continue
             if (other := names.setdefault(query.name, element.line)) != element.line:
                 span = self.source.span(element.line, element.column)
                 message = f"{quoted(query.name)} also names the property on line {other}"
-                self.report(Diagnostic("F2001", message, "rename one of them", span=span))
+                self.problems.report(Diagnostic("F2001", message, "rename one of them", span=span))
             yield query
 
     def query(self, element: Element) -> Query:
@@ -229,7 +225,7 @@ class _Reading:
         unknown = self.known.place(name) if kind == "place" else self.known.transition(name)
         for problem in unknown:
             span = self.source.span(element.line, element.column, len(element.tag) + 2)
-            self.report(replace(problem, span=span))
+            self.problems.report(replace(problem, span=span))
         return name
 
 

@@ -21,7 +21,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Final
 
-from firable.nets.diagnostics import Diagnostic, InputError, bounded
+from firable.nets.diagnostics import Diagnostic, InputError, Problems, bounded
 from firable.nets.formula import (
     CONSTANT_ATOMS,
     Compare,
@@ -40,7 +40,6 @@ from firable.nets.temporal_parts import atoms_in
 from firable.nets.well_formed import is_name, unknown_in_formula
 
 SIZE_BYTES_MAX: Final = 64 * 1024 * 1024
-PROBLEMS_MAX: Final = 100  # enough to read; a file of noise has millions
 
 
 class QueryKind(StrEnum):
@@ -166,14 +165,10 @@ class _Lines:
 
     def __init__(self, source: Source, net: Net) -> None:
         self.source, self.net = source, net
-        self.problems: list[Diagnostic] = []
+        self.problems = Problems()
 
     def refuse(self, code: str, message: str, hint: str, line: int, column: int) -> None:
-        self.report(Diagnostic(code, message, hint, span=self.source.span(line, column)))
-
-    def report(self, problem: Diagnostic) -> None:
-        if len(self.problems) < PROBLEMS_MAX:
-            self.problems.append(problem)
+        self.problems.report(Diagnostic(code, message, hint, span=self.source.span(line, column)))
 
     def queries(self) -> Iterator[Query]:
         names: dict[str, int] = {}
@@ -197,7 +192,7 @@ class _Lines:
                 continue
             for problem in known.problems(query):
                 at, length = _named(problem, text.strip())
-                self.report(replace(problem, span=self.source.span(number, column + at, length)))
+                self.problems.report(replace(problem, span=self.source.span(number, column + at, length)))
             yield query
 
 

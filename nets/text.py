@@ -24,7 +24,7 @@ from typing import Final
 from pydantic import ValidationError
 
 from firable.nets import document as doc
-from firable.nets.diagnostics import Diagnostic, InputError, Subject
+from firable.nets.diagnostics import Diagnostic, InputError, Problems, Subject
 from firable.nets.document_errors import document_problems, version_problem
 from firable.nets.formula import Formula, FormulaError, parse_formula
 from firable.nets.net import (
@@ -62,7 +62,6 @@ from firable.nets.verdict import Expectation, Status
 from firable.nets.yaml_tree import Node, data, parse_tree
 
 SIZE_BYTES_MAX: Final = 16 * 1024 * 1024
-PROBLEMS_MAX: Final = 100  # enough to join and to read; a file of noise has millions
 
 
 def read_net(path: str | Path) -> Net:
@@ -149,7 +148,7 @@ class _Reading:
     def __init__(self, source: Source, tree: Node, document: doc.NetDocument) -> None:
         self.document = document
         self.positions = Positions(source, tree)
-        self.problems: list[Diagnostic] = []
+        self.problems = Problems()
         self.faults: list[Transition] = []
         """The fault transitions that time limits give; they come after those of the file."""
         controllers = ((name, body or doc.ControllerDocument()) for name, body in (document.controllers or {}).items())
@@ -157,10 +156,6 @@ class _Reading:
             *(_Scope(name, ("controllers", name), c.start, c.inputs, c.places or {}) for name, c in controllers),
             _Scope(None, (), document.start, document.inputs, document.places or {}),
         ]
-
-    def problem(self, problem: Diagnostic) -> None:
-        if len(self.problems) < PROBLEMS_MAX:
-            self.problems.append(problem)
 
     def net(self) -> Net:
         document = self.document
@@ -199,9 +194,9 @@ class _Reading:
         for local in scope.start:
             subject: Subject = (*scope.path, "start", local)
             if local not in scope.places:
-                self.problem(_unknown_start(scope, local, subject))
+                self.problems.report(_unknown_start(scope, local, subject))
             elif local in marked:
-                self.problem(
+                self.problems.report(
                     Diagnostic(
                         "F2006", f"'{local}' stands twice in `start`", "a place holds one token at most", subject
                     )
@@ -235,21 +230,21 @@ class _Reading:
             if within.to and scope.is_full(within.to):
                 subject = ("places", full, "within", "to")
                 message = f"there is no place '{scope.full(within.to)}' to go to"
-                self.problem(Diagnostic("F2002", message, scope.said_local(within.to), subject))
+                self.problems.report(Diagnostic("F2002", message, scope.said_local(within.to), subject))
                 continue
             fault = fault_place(made)
             to = scope.full(within.to) if within.to else fault.name
             if to == fault.name and scope.local(to) not in scope.places:
                 yield fault
             if to == full:
-                self.problem(_fault_at_itself(full))
+                self.problems.report(_fault_at_itself(full))
             elif made.completion is not None:  # otherwise `Net` says that there is none (F2028)
                 self.faults.append(fault_transition(made, to, within.transition or fault_transition_name(full)))
 
     def milliseconds(self, place: str, within: doc.WithinDocument) -> int:
         found = parse_time(within.time)
         if found is None:
-            self.problem(no_time(place, within.time))
+            self.problems.report(no_time(place, within.time))
             return 1  # that it is none is said once
         return found
 
@@ -272,7 +267,7 @@ class _Reading:
         for name, transition in (self.document.transitions or {}).items():
             inputs, outputs = transition.inputs, transition.outputs
             for both in () if (twice := set(inputs)).isdisjoint(outputs) else sorted(twice.intersection(outputs)):
-                self.problem(
+                self.problems.report(
                     Diagnostic(
                         "F2009",
                         f"'{both}' is both in `from` and in `to` of '{name}', which can then never fire",
@@ -334,7 +329,7 @@ class _Reading:
 
     def no_formula(self, error: FormulaError, hint: str, subject: Subject) -> None:
         problem = Diagnostic("F1012", f"not a formula: {error.message}", hint, subject)
-        self.problem(replace(problem, span=self.positions.in_formula(subject, error.column)))
+        self.problems.report(replace(problem, span=self.positions.in_formula(subject, error.column)))
 
 
 def _unknown_start(scope: _Scope, local: str, subject: Subject) -> Diagnostic:
