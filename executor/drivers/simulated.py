@@ -1,8 +1,8 @@
 """The driver of the simulated cell: commands become commands of the plant, what the plant sees becomes signals.
 
 Each command goes out under a ticket of its own, which the plant gives back when the command is done, so that a late
-acknowledgement is never taken for that of a later command. There is no link here that could be lost; a driver of points
-and connections that reaches a simulated cell through them is `in_process.py`.
+acknowledgement is never taken for that of a later command. There is no link here that could be lost; behind the points
+and connections of real devices the simulated cell is in `far_side/cell.py`.
 
 With a log, the cell outlives the process, as machines do: all inputs of the past are given to it again, and it is where
 it was, forming the completions that it was forming. A stop interrupts the commands that machines are at; whether such a
