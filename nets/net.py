@@ -16,7 +16,7 @@ costs 20 times the memory and forbids the bitwise firing rule.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
 from itertools import islice
@@ -125,6 +125,15 @@ class Place:
         """The signals that a token clears when it enters: the completion of the command, and the timer."""
         timer = None if self.within is None else self.within.timer
         return tuple(signal for signal in (self.completion, timer) if signal is not None)
+
+
+def holding(places: Iterable[Place], marking: Marking) -> tuple[Place, ...]:
+    """The places of a net, in their order, with the tokens of a marking: those of the net that begins there.
+
+    >>> [place.marked for place in holding((Place("p", marked=True), Place("q")), 0b10)]
+    [False, True]
+    """
+    return tuple(replace(place, marked=bool(marking >> p & 1)) for p, place in enumerate(places))
 
 
 class SignalKind(StrEnum):

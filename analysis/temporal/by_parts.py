@@ -26,7 +26,7 @@ from firable.analysis.temporal.queries import as_goal
 from firable.analysis.temporal.simplifying import FALSE, TRUE, implied, simplified
 from firable.analysis.walk import decide_by_walk
 from firable.nets.formula import And, Constant, Formula, Not, Or, Start
-from firable.nets.net import Net
+from firable.nets.net import Net, holding
 from firable.nets.temporal import (
     Eventually,
     Exists,
@@ -199,13 +199,11 @@ class _Parts:
         values = []
         for number, t in enumerate(firable):
             marking = player.fire(self.net.initial_marking, (t,))
-            places = tuple(replace(place, marked=bool(marking >> i & 1)) for i, place in enumerate(self.net.places))
             left = self.limits.deadline.left_seconds
             share = 1 / (len(firable) - number)
             within = self.limits.deadline if left is None else self.limits.deadline.within(left * share)
-            there = _Parts(
-                replace(self.net, places=places), replace(self.limits, deadline=within), methods=self.methods
-            )
+            net = replace(self.net, places=holding(self.net.places, marking))
+            there = _Parts(net, replace(self.limits, deadline=within), methods=self.methods)
             holds, _ = there._value(operand)
             if holds is not every and holds is not None:
                 return holds

@@ -50,7 +50,7 @@ from firable.analysis.evidence.meaning import contact
 from firable.analysis.evidence.refusal import TimeIsOverError, refuse
 from firable.analysis.induction.encoding import Relation, interleaving_relation, marking_term, step_relation
 from firable.analysis.induction.smt import Operator, Term, Terms, subterms
-from firable.nets.net import Marking, Net
+from firable.nets.net import Marking, Net, holding
 from firable.semantics.counting import TableTooLargeError, at_most
 from firable.semantics.firing import Valuation
 from firable.semantics.formulas import evaluate
@@ -93,9 +93,9 @@ def continued(evidence: Evidence) -> Evidence:
     if not isinstance(certificate, Continuation):
         raise TypeError("the evidence is no continuation")
     marking = played(net, evidence.discipline, certificate.firings)[-1]
-    places = tuple(replace(place, marked=bool(marking >> p & 1)) for p, place in enumerate(net.places))
     claim = Claim(ClaimKind.NEVER, without_start(net, evidence.claim.state_goal))
-    return Evidence(replace(net, places=places, properties=()), evidence.discipline, claim, certificate.then)
+    there = replace(net, places=holding(net.places, marking), properties=())
+    return Evidence(there, evidence.discipline, claim, certificate.then)
 
 
 def played(net: Net, discipline: Discipline, firings: Iterable[Iterable[str]]) -> list[Marking]:

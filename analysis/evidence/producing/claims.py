@@ -52,7 +52,7 @@ from firable.analysis.verdicts.unanswered import unanswered
 from firable.nets.bits import bits
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import Firable, Formula
-from firable.nets.net import Marking, Net
+from firable.nets.net import Marking, Net, holding
 from firable.nets.temporal import Temporal
 from firable.nets.verdict import Witness
 from firable.semantics.player import Player
@@ -207,9 +207,8 @@ class Certifier:
 
     def _never_after(self, way: Witness, goal: Formula, spelled: Formula) -> Continuation | None:
         """What shows that after this run the goal is never reached; kept, since it shows the same of other goals."""
-        marking, net = self.net.marking(way.marking), self.net
-        places = tuple(replace(place, marked=bool(marking >> p & 1)) for p, place in enumerate(net.places))
-        net = replace(net, places=places, properties=())
+        marking = self.net.marking(way.marking)
+        net = replace(self.net, places=holding(self.net.places, marking), properties=())
         spaces = Spaces(net, self.discipline, self.limits)
         if spaces.graph is not None:
             return self._never_on(spaces.graph, spaces.markings, way, spelled)
@@ -278,8 +277,7 @@ class Certifier:
                 if way is None:
                     raise LackingError("no way to the home marking was found")
                 prefix = way.firings
-                places = tuple(replace(place, marked=bool(home >> p & 1)) for p, place in enumerate(net.places))
-                net = replace(net, places=places, properties=())
+                net = replace(net, places=holding(net.places, home), properties=())
             if self.discipline is Discipline.STEP:
                 raise LackingError(self.spaces.ended(WIDE_MAX) or f"there are more than {WIDE_MAX:,} markings")
             found, left = runs_by_search(
