@@ -30,6 +30,7 @@ class _Line:
         self._width = 0
 
     def _write(self, line: str) -> None:
+        line = line[: get_terminal_size().columns - 1]  # the rest of a broken line could not be wiped
         self._stream.write(f"\r{line.ljust(self._width)}")
         self._stream.flush()
         self._width = len(line)
@@ -64,7 +65,7 @@ class ProgressLine(_Line):
             self._next = now + (EVERY_SECONDS if self._is_terminal else 10 * EVERY_SECONDS)
             line = f"  {words}, {now - self._began:.0f} s"
             if self._is_terminal:
-                self._write(line[: get_terminal_size().columns - 1])  # the rest of a broken line could not be wiped
+                self._write(line)
             else:
                 self._stream.write(f"{line}\n")
                 self._stream.flush()

@@ -127,6 +127,16 @@ def test_stages_tell_what_is_done_and_for_how_long_and_are_wiped() -> None:
     assert terminal.getvalue().endswith(f"\r{' ' * len('  O2, 2 s')}\r")
 
 
+def test_a_stage_of_many_words_is_one_line_of_a_narrow_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "20")
+    clock, terminal = Clock(), Terminal()
+    line = Stages(terminal, clock)
+    line("what is said of this stage is long")
+    clock.now_seconds = 2.0
+    line.tell()
+    assert terminal.getvalue() == f"\r{'  what is said of this stage'[:19]}", "what is broken could not be wiped"
+
+
 def test_stages_are_for_terminals(monkeypatch: pytest.MonkeyPatch) -> None:
     for stream, shown in ((Terminal(), True), (io.StringIO(), False)):
         monkeypatch.setattr("sys.stderr", stream)
