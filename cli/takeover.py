@@ -116,6 +116,9 @@ def takeover(
     if moved.under_way:
         click.echo(f"  under way, and asked after at the start: the commands of {', '.join(moved.under_way)}")
     click.echo("  begun anew: whose turn it is where arbiters alternate; what sensors show is read at the start")
+    for file, mark in zip(journals, marks, strict=True):
+        kept_apart = "; bring that back to its host with the new one" if len(journals) > 1 else ""
+        click.echo(f"  {file} is not run on any more: {mark} beside it says so{kept_apart}")
     for file, names in dealt.items():
         if names:
             host = "".join(f" --controller {name}" for name in controllers[file]) if len(dealt) > 1 else ""

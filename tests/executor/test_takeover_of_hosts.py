@@ -47,6 +47,8 @@ def test_a_cell_on_several_hosts_is_taken_over_together_and_its_hosts_know_each_
     assert main(["takeover", *map(str, bundles), *hosts(bundles, tmp_path)]) == 0
     told = capsys.readouterr().out
     assert f"  next: firable run {bundles[1]} --controller robot --journal {tmp_path / 'robot.new'}, with" in told
+    old = tmp_path / "robot.old"
+    assert f"  {old} is not run on any more: {old}.taken-over beside it says so; bring that back to its host" in told
     read = read_bundle(bundles[1])
     kept, memories = dict[str, Mapping[str, Stored]](), dict[str, Memory]()
     for name, machines in HOSTS_OF_OLD.items():
