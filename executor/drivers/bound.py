@@ -16,7 +16,6 @@ from firable.executor.drivers.cancelling import ended, uninterrupted
 from firable.executor.drivers.completions import Completions
 from firable.executor.drivers.driver import Answer, Cautious, Clock, Listener, Reading
 from firable.executor.drivers.fitting import misfits
-from firable.executor.drivers.rivals import demand_alone
 from firable.executor.drivers.sharing import masters, shared
 from firable.nets.diagnostics import InputError
 from firable.nets.net import Net, Place, SignalKind
@@ -71,8 +70,6 @@ class BoundDriver:
         self.listener: Listener | None = None
         self.has_begun = False
         """Whether it may have done something to its devices."""
-        self.listening: asyncio.Task[None] | None = None
-        """What finds out whether another program commands the devices, before anything is written."""
         self.is_stopped = False
         self.is_latched = latched
         """Whether there was an emergency stop, and nobody has reset it."""
@@ -118,14 +115,10 @@ class BoundDriver:
         return {name: reading for device in self.devices.values() for name, reading in device.image.readings.items()}
 
     async def run(self, clock: Clock, listener: Listener) -> None:
-        """Serve the devices until cancelled; on the way out the safe outputs are driven.
-
-        Raises `InputError` F5106 where another program commands one of them; then nothing has been written.
-        """
+        """Serve the devices until cancelled; on the way out the safe outputs are driven."""
         self.clock, self.listener = clock, listener
         if isinstance(listener, Cautious):
             await listener.let_drive()
-        await self._demand_alone()
         self.has_begun = True
         tasks = [asyncio.create_task(device.run(), name=name) for name, device in self.devices.items()]
         try:
@@ -139,18 +132,6 @@ class BoundDriver:
                 self.stop()
             finally:  # whatever became of the notes
                 await uninterrupted(self._stopped(tasks))
-
-    async def _demand_alone(self) -> None:
-        """Raise `InputError` F5106 where another program commands a device; a stop does not wait for that."""
-        if self.is_latched or self.is_stopped:
-            return
-        self.listening = asyncio.create_task(demand_alone(self.binding))
-        try:
-            await self.listening
-        except asyncio.CancelledError:
-            own = asyncio.current_task()
-            if own is not None and own.cancelling():
-                own.cancel()  # of who drives by then, and on its way out drives the safe outputs
 
     async def _stopped(self, tasks: Sequence[asyncio.Task[None]]) -> None:
         """Wait until each device is safe or has had its time, and tell of those that are not; raises a mistake."""
@@ -230,8 +211,6 @@ class BoundDriver:
         """Drive the safe outputs of every device that can be reached; the others have their watchdogs."""
         if not self.is_stopped:
             self.is_stopped = True
-            if self.listening is not None:
-                self.listening.cancel()
             left = [device for device in self.devices.values() if self.has_begun and device.is_out_of_reach]
             for device in self.devices.values():
                 device.kept.stop()

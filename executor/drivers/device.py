@@ -254,6 +254,16 @@ class Bounded(Protocol):
 
 
 @runtime_checkable
+class Shared(Protocol):
+    """A kind of device (`DeviceKind`) that several programs may be connected to at a time, as is no line."""
+
+    @property
+    def shows_writes(self) -> bool:
+        """Whether each of them can read what the others have written."""
+        ...
+
+
+@runtime_checkable
 class Divided(Protocol):
     """A kind of device (`DeviceKind`) of which one point may be a part of another, as a bit is of a register."""
 

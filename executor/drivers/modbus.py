@@ -96,6 +96,7 @@ class ModbusTcp(_Modbus):
 
     options: type[Options] = TcpOptions
     through_broker = False
+    shows_writes = True
 
     def load(self) -> None:
         """Import what is needed."""

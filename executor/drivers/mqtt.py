@@ -197,6 +197,7 @@ class Mqtt:
 
     options: type[Options] = MqttOptions
     through_broker = True
+    shows_writes = True
 
     def point_problem(self, point: Point, use: Use) -> str:
         """What is wrong with a topic."""

@@ -376,6 +376,7 @@ class OpcUa:
 
     options: type[Options] = OpcUaOptions
     through_broker = False
+    shows_writes = True
 
     def point_problem(self, point: Point, use: Use) -> str:
         """What is wrong with a node id; what may be written only the server knows."""

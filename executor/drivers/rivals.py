@@ -3,16 +3,18 @@
 The hosts of one run know of each other by their link, and share no device (`sharing.py`). A second run of the whole
 binding is none of these hosts: it was started twice, or an old computer was switched on again with the script of last
 year. Both would command the machines, each would stop those of the other at its start and its end, and the watchdog of
-the device would be content with the heartbeat of either. So before a run writes anything it listens for the time of
-three beats. A heartbeat that changes twice while nobody here sends it is another program's, and the run does not begin
-(F5106): it has written nothing, the safe outputs neither. One change may be the last beat of a process that was killed,
+the device would be content with the heartbeat of either. So before a run begins, before its journal is opened and
+anything is written, it listens for the time of four beats. A heartbeat that changes twice while nobody here sends it is
+another program's, and the run does not begin (F5106). One change may be the last beat of a process that was killed,
 still on its way.
 
-A heartbeat that cannot be read, of a device that has no connection now, says nothing. A run that follows an emergency
-stop does not listen: the stop waits for nothing. Two runs that are started in the same second do not hear each other.
+What cannot be heard says nothing: a heartbeat that the device does not show, and whatever goes wrong with a connection
+here, which goes wrong once more in the run and is dealt with there. A line has one program at a time. Two runs that are
+started in the same second do not hear each other.
 
-Rejected: to look at the heartbeat as long as the run lasts. Of two that notice each other both would stop, and the one
-that was there first is the one that should not.
+Rejected: to listen when the run has begun. What fires by then is commanded later, all devices wait for the slowest of
+them, and an emergency stop with them. Rejected: to look at the heartbeat as long as the run lasts. Of two that notice
+each other both would stop, and the one that was there first is the one that should not.
 """
 
 from __future__ import annotations
@@ -23,11 +25,18 @@ from typing import Final
 
 from firable.executor.drivers.binding import Binding
 from firable.executor.drivers.cancelling import ended
-from firable.executor.drivers.device import LinkError, Use, Value, Wanted
+from firable.executor.drivers.device import Connection, DeviceKind, Point, Shared, Use, Value, Wanted, as_number
 from firable.nets.diagnostics import Diagnostic, InputError
 
-_BEATS: Final = 3
+BEATS: Final = 4
 """So many beats of a heartbeat are waited for its two changes."""
+SECONDS_MIN, SECONDS_MAX = 1.0, 10.0
+"""But at least so long, for who beats may be busy, and at most so long, for somebody waits for the start."""
+
+
+def shows(kind: DeviceKind) -> bool:
+    """Whether a program can read there what another one has written."""
+    return isinstance(kind, Shared) and kind.shows_writes
 
 
 async def demand_alone(binding: Binding) -> None:
@@ -41,23 +50,41 @@ async def demand_alone(binding: Binding) -> None:
         raise InputError(problems)
 
 
+async def _hears(connection: Connection, point: Point, every_s: float) -> bool:
+    """Whether a point that nobody here writes changes twice in the time of some beats, from number to number."""
+    changes, before = 0, None
+    with suppress(TimeoutError):
+        async with asyncio.timeout(min(max(BEATS * every_s, SECONDS_MIN), SECONDS_MAX)):
+            while changes < 2:
+                for at, value in await connection.read():
+                    if at == point and (beat := _beat(value)) is not None:
+                        changes += before is not None and beat != before
+                        before = beat
+    return changes >= 2
+
+
+def _beat(value: Value) -> int | None:
+    """What a point shows of a heartbeat; None for what is none, such as the words of a server that has no value yet."""
+    return int(value) if isinstance(value, bool) else as_number(value)
+
+
 async def _rival(binding: Binding, name: str) -> Diagnostic | None:
-    """What another program has sent to a device meanwhile, if any does."""
+    """That another program sends the heartbeat of a device, if one does."""
     device, kind = binding.document.devices[name], binding.kinds[name]
-    if device.heartbeat is None or kind.point_problem(device.heartbeat.write, Use.READ):
+    heartbeat = device.heartbeat
+    if heartbeat is None or not shows(kind) or kind.point_problem(heartbeat.write, Use.READ):
         return None
-    point, shown = device.heartbeat.write, dict[Value, None]()
-    with suppress(LinkError, OSError, TimeoutError):
+    try:
         async with asyncio.timeout(2 * device.timeout_s):
-            connection = await kind.connect(binding.options[name], Wanted((point,), device.timeout_s))
+            connection = await kind.connect(binding.options[name], Wanted((heartbeat.write,), device.timeout_s))
         try:
-            async with asyncio.timeout(min(_BEATS * device.heartbeat.every_s, device.start_s)):
-                while len(shown) <= 2:
-                    shown |= dict.fromkeys(value for at, value in await connection.read() if at == point)
+            is_heard = await _hears(connection, heartbeat.write, heartbeat.every_s)
         finally:
             await connection.close()
-    if len(shown) <= 2:
+    except Exception:  # the run meets it again, and stops its machines in order
         return None
-    message = f"another program sends the heartbeat of '{name}', at '{point}', and commands its machines"
+    if not is_heard:
+        return None
+    message = f"another program sends the heartbeat of '{name}', at '{heartbeat.write}', and commands its machines"
     hint = "this run has not begun, and has written nothing: end that program first, or name the device that is meant"
     return binding.problem("F5106", ("devices", name, "heartbeat", "write"), message, hint)

@@ -7,13 +7,16 @@ signed it; at connection the hosts compare what they hold.
 
 from __future__ import annotations
 
+import asyncio
 import ssl
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
+from firable.executor.drivers.bound import BoundDriver
 from firable.executor.drivers.driver import Driver, Latched
+from firable.executor.drivers.rivals import demand_alone
 from firable.executor.links.link import Greeting, Link
 from firable.executor.operating.conduct import UNATTENDED, Conduct, Watch
 from firable.executor.operating.host import Host
@@ -184,8 +187,11 @@ def run_host(
 
     Where a `plant` says what the machines should do, those here are held against it as the run goes, until it is taken
     up or reset. With a service, and `latched` to make the driver of the same machines anew, it stays after an emergency
-    stop until that is reset. Raises `InputError` as link, journal and trace do, and F5003 where the plant does not fit.
+    stop until that is reset. Raises `InputError` as link, journal and trace do, F5003 where the plant does not fit, and
+    F5106 where another program commands a device, before anything is written.
     """
+    if isinstance(driver, BoundDriver):
+        asyncio.run(demand_alone(driver.binding))
     controllers = [subnet.name for subnet in bundle.decomposition.subnets if subnet.name in machines]
     monitor = None
     if plant is not None and conduct.watch is not Watch.IGNORE:

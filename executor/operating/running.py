@@ -9,6 +9,7 @@ The simulated cell runs in virtual time unless a speed is given; then a run is a
 
 from __future__ import annotations
 
+import asyncio
 from collections import Counter
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -19,6 +20,7 @@ from firable.executor.cell.disturbances import Disturbance
 from firable.executor.cell.plant import Plant
 from firable.executor.drivers.binding import Binding
 from firable.executor.drivers.bound import bound_driver
+from firable.executor.drivers.rivals import demand_alone
 from firable.executor.drivers.simulated import SimulatedDriver
 from firable.executor.operating.conduct import UNATTENDED, Conduct, Told, Watch
 from firable.executor.operating.host import Host
@@ -268,13 +270,16 @@ def run_bound(
     """Run a bundle on the machines of a binding, in real time, until the operator stops it or nothing can go on.
 
     What workpieces there are is not to be known; the report counts none. Told, too, is of links that come and go, by
-    device and sentence; the machines are watched where a `plant` says what they do. Raises `InputError` F5002 where the
-    bundle is not proved, F5101 where the binding does not fit it, both before anything is connected; F1017 where the
-    trace cannot be written, and F5031 to F5034 where the journal cannot be gone on with.
+    device and sentence; the machines are watched where a `plant` says what they do.
+
+    Raises `InputError` F5002 where the bundle is not proved, F5101 where the binding does not fit it, both before
+    anything is connected; F5106 where another program commands a device, before anything is written; F1017 where the
+    trace cannot be written, and F5031 to F5036 where the journal cannot be gone on with.
     """
     if problems := (*unproved(bundle), *(misfits(plant, bundle.net) if plant is not None else ())):
         raise InputError(problems)
     driver = bound_driver(binding, bundle.net)
+    asyncio.run(demand_alone(driver.binding))
     decomposition = bundle.decomposition
     with opened(decomposition, bundle.digest, conduct.journal_path, conduct.trace) as files:
         figures = figures_for(decomposition.net, conduct.service)

@@ -49,7 +49,6 @@ class TestModbusTcp(DriverConformance):
 
 class TestModbusRtu(DriverConformance):
     counts_edges = False
-    shows_heartbeat = False
 
     @asynccontextmanager
     async def far_end(self) -> AsyncIterator[Far]:

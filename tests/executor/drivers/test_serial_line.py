@@ -25,8 +25,6 @@ from firable.executor.drivers.keeping import Kept, Nobody
 
 
 class TestSerialLine(DriverConformance):
-    shows_heartbeat = False
-
     @asynccontextmanager
     async def far_end(self) -> AsyncIterator[Far]:
         end = SerialEnd()

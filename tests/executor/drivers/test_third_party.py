@@ -25,8 +25,6 @@ def installed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 class TestNumbers(DriverConformance):
-    shows_heartbeat = False
-
     @asynccontextmanager
     async def far_end(self) -> AsyncIterator[Far]:
         points = {role: f"the {role}" for role in (*ROLES, "number")}
@@ -34,8 +32,6 @@ class TestNumbers(DriverConformance):
 
 
 class TestTexts(DriverConformance):
-    shows_heartbeat = False
-
     @asynccontextmanager
     async def far_end(self) -> AsyncIterator[Far]:
         points = {role: f"the {role}" for role in (*ROLES, "command")}
