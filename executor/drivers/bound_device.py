@@ -477,7 +477,7 @@ class BoundDevice:
         is_new = channel.shown.get(key, 0) is not None  # else a text that changes would be told as often as it does
         for outcome in channel.shows(key, value):
             self._said(outcome)
-        if channel.shown[key] is None and is_new and quoted(value) != self.garbage.get(point):
+        if value != "" and channel.shown[key] is None and is_new and quoted(value) != self.garbage.get(point):
             self.garbage[point] = quoted(value)
             self.note(f"'{point}' shows {quoted(value)}, which says nothing of a command")
 

@@ -73,11 +73,22 @@ class SimulatedConnection:
         """What the sensors show at first, then all that has changed."""
         if self.is_first:
             self.is_first = False
-            return [(point, value) for point, value in self.options.shows.items() if point in self.wanted]
+            return self._at_first()
         batch = [await self.told.get()]
         while not self.told.empty():
             batch.append(self.told.get_nowait())
         return batch
+
+    def _at_first(self) -> list[tuple[Point, Value]]:
+        """What is shown before any command: no point that it has may look like one that is written wrong.
+
+        What was taken before a restart it does not know, so an empty text stands there: 0 would mean "not received".
+        """
+        changed = {sensor: 0 for effect in self.options.effects.values() for sensor in effect.then}
+        sensors = {**changed, **self.options.shows}
+        nothing: dict[str, Value] = {"taken": "", "done": 0, "failed": 0}
+        answers = {point: nothing[what] for point in self.wanted if (what := point.rpartition(".")[2]) in nothing}
+        return [(point, value) for point, value in (answers | sensors).items() if point in self.wanted]
 
     async def write(self, writes: Writes) -> None:
         """Take commands, or stop."""

@@ -114,3 +114,18 @@ def test_after_a_restart_a_simulated_machine_knows_nothing_of_its_commands() -> 
         await asyncio.wait([task])
 
     asyncio.run(main())
+
+
+def test_what_no_command_has_changed_yet_is_shown_from_the_start() -> None:
+    async def main() -> None:
+        text = BINDING.replace("shows: {part: 1, shut: 0}", "shows: {part: 1}\n    start_s: 0.05")
+        heard, mixed = Heard(), driver(text)
+        await MemoryEnd("mixed").start(lambda _point, _value: None)
+        task = asyncio.create_task(mixed.run(heard, heard))
+        await until(lambda: mixed.devices["twin"].is_overdue, "the time to show all")
+        assert mixed.devices["twin"].unshown == ""
+        assert [note for note in heard.notes if note.startswith("twin")] == ["twin: connected"]
+        task.cancel()
+        await asyncio.wait([task])
+
+    asyncio.run(main())
