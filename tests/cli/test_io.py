@@ -143,11 +143,14 @@ def test_a_program_reads_signals_as_lines_of_json_of_the_published_schema(
     assert {(one["value"], one["quality"]) for one in line["signals"].values()} == {(None, "bad")}
 
 
-def test_looking_writes_nothing_and_sending_by_hand_is_for_what_the_binding_allows(cell: Cell) -> None:
+def test_looking_writes_nothing_and_sending_by_hand_is_for_what_the_binding_allows(
+    cell: Cell, capsys: pytest.CaptureFixture[str]
+) -> None:
     sending = ["io", str(cell.bind), "--once", "--net", "catalogue:one_robot", "--send"]
     assert main(["io", str(cell.bind), "--once"]) == 0
     assert main([*sending, "robot.to_cv1"]) == 2
     assert main([*sending, "robot.back"]) == 0
+    assert "robot.back: taken" in capsys.readouterr().err.splitlines()
     assert cell.line_with(" R ").strip().endswith("R MOVE to=HOME")
 
 
