@@ -127,7 +127,10 @@ class _Asked:
 )
 @page_option
 @click.option(
-    "--no-cache", is_flag=True, help="Decide anew what was decided before of the same net; see FIRABLE_CACHE."
+    "--no-cache",
+    is_flag=True,
+    help="Decide anew what was decided before of the same net. Answers are kept in the cache folder of the user, or in "
+    "the one that the environment variable FIRABLE_CACHE names; where it is empty, nowhere.",
 )
 @click.option(
     "--progress/--no-progress", default=None, help="Tell how far exploring is.  [default: where there is a terminal]"

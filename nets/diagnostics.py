@@ -154,7 +154,7 @@ CODES: Final[dict[str, str]] = {
     "F5050": "a run that a new bundle may not go on from",
     "F5051": "a marking that the new bundle does not reach",
     "F5060": "an operator's endpoint that is open to everybody",
-    "F5061": "an operator's endpoint that cannot be served",
+    "F5061": "an address that cannot be served",
     "F5062": "a certificate that cannot be used",
     "F5063": "a run that cannot be operated",
     "F5070": "a request of the page that cannot be answered",

@@ -206,7 +206,7 @@ async def listening(app: web.Application, endpoint: Endpoint, strangers: Strange
         try:
             await site.start()
         except OSError as error:
-            message = f"the operator's endpoint cannot be had at {endpoint.host}:{endpoint.port}: {reason(error)}"
+            message = f"nothing can be served at {endpoint.host}:{endpoint.port}: {reason(error)}"
             raise InputError([Diagnostic("F5061", message, "name another port; 0 takes a free one")]) from None
         host, port = runner.addresses[0][:2]
         shown = f"[{host}]" if ":" in host else host

@@ -245,7 +245,7 @@ error[F5033]: {folder}/cell.journal: the journal is in use by another process
     "F5061": (
         a_port_that_is_taken,
         """\
-error[F5061]: the operator's endpoint cannot be had at 127.0.0.1:8080: Address already in use
+error[F5061]: nothing can be served at 127.0.0.1:8080: Address already in use
   hint: name another port; 0 takes a free one
 """,
     ),
