@@ -39,6 +39,21 @@ def test_the_machines_of_the_catalogue_keep_every_assumption(cell: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("until", "broken"), [("", {f"o4.t1-{way}/robot.reset" for way in "efghi"}), (", until: at_rest", set())]
+)
+def test_a_key_holds_until_the_way_back_fires_where_the_fault_place_waits_for_its_stop(
+    until: str, broken: set[str]
+) -> None:
+    # As docs/time-limits.md says of this cell.
+    text = catalogue_path("one_robot_timed").read_text("utf-8")
+    net = parse_net(
+        text.replace("command: STOP}, description: stopped", f"command: STOP}}{until}, description: stopped")
+    )
+    found = held_gates(split(net), catalogue_plant("one_robot_timed")).verdicts
+    assert {verdict.name for verdict in found if not verdict.holds} == broken
+
+
+@pytest.mark.parametrize(
     ("old", "new", "name", "move", "others"),
     [
         ("{occupied: mc_table}", "{occupied: mc_table, may_flicker: true}", "o4.G4/mc.part_present", "drops", set()),
