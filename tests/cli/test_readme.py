@@ -70,3 +70,16 @@ def test_no_blank_line_cuts_a_table(page: str) -> None:
     outside = re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL)
     heads = re.findall(r"(?:\A|\n\n)\|[^\n]*\n([^\n]*)", outside)
     assert all(re.fullmatch(r"[|:\- ]+", below) for below in heads)
+
+
+def test_a_file_that_the_map_names_alone_lies_beside_the_path_before_it() -> None:
+    rows = [line for line in (ROOT / "ARCHITECTURE.md").read_text("utf-8").splitlines() if line.startswith("|")]
+    astray, folder = [], ROOT
+    for name in re.findall(r"`([\w/.-]+(?:\.py|\.rs|/))`|^\|", "\n".join(rows), re.MULTILINE):
+        if not name:  # a row begins
+            folder = ROOT
+        elif "/" in name:
+            folder = ROOT / name if name.endswith("/") else (ROOT / name).parent
+        elif not (folder / name).is_file():
+            astray.append(f"{folder.relative_to(ROOT)}: {name}")
+    assert not astray
