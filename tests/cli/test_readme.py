@@ -75,7 +75,7 @@ def test_no_blank_line_cuts_a_table(page: str) -> None:
 def test_a_file_that_the_map_names_alone_lies_beside_the_path_before_it() -> None:
     rows = [line for line in (ROOT / "ARCHITECTURE.md").read_text("utf-8").splitlines() if line.startswith("|")]
     astray, folder = [], ROOT
-    for name in re.findall(r"`([\w/.-]+(?:\.py|\.rs|/))`|^\|", "\n".join(rows), re.MULTILINE):
+    for name in re.findall(r"`([\w.-]+\.(?:py|rs)|[\w.-]+/[\w/.-]*)`|^\|", "\n".join(rows), re.MULTILINE):
         if not name:  # a row begins
             folder = ROOT
         elif "/" in name:
