@@ -46,7 +46,7 @@ from firable.analysis.question import LARGER, Question, unknown
 from firable.analysis.race import SLICES_SECONDS, Contestant, race
 from firable.analysis.report import CheckReport, report_on
 from firable.analysis.settling import Lanes, Settling
-from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
+from firable.analysis.spaces.reachability import REASONS, Budget, ReachabilityGraph, explore
 from firable.analysis.spaces.space import StateSpace
 from firable.analysis.temporal.queries import as_goal, question_of, temporal_question
 from firable.analysis.verdicts.behaviour import DEADLOCK_FREE, QUESTIONS
@@ -63,6 +63,8 @@ ALONE_SECONDS: Final = 60.0
 """How long a technique that is named has for each question, where no time is given."""
 ALONE_STEPS: Final = 50
 """How long runs it unrolls then: a solver takes longer for each further step, and comes to no end by itself."""
+AGAIN: Final = "ask again, and let it come to its end"
+"""What helps where Ctrl-C has ended a search."""
 _INTERRUPTED: Final = "interrupted"
 _ALONE_SECONDS: Final = 0.1
 """How long techniques that hold all markings are alone, before others begin beside them."""
@@ -223,7 +225,8 @@ class _Check:
         if verdict.status is not Status.UNKNOWN:
             return verdict
         if (said := settling.reached.get(verdict.name)) is not None:
-            return replace(verdict, bound=said, hint="allow it more time, with --max-seconds, or leave out --method")
+            more = "allow it more time, with --max-seconds, or leave out --method"
+            return replace(verdict, bound=said, hint=AGAIN if self.interrupted.is_set() else more)
         why = "was not asked any more" if self.deadline.over else "does not decide it"
         return replace(verdict, bound=f"{words} {why}", hint="leave out --method, or name another one")
 
@@ -394,9 +397,12 @@ def _size(space: StateSpace[Any]) -> str:
 
 
 def _left_off(report: CheckReport) -> CheckReport:
-    """A report that Ctrl-C has ended: what is unknown by that is no matter of the budget."""
-    hint = "ask again, and let it come to its end"
-    told = (replace(verdict, hint=hint) if verdict.hint == LARGER else verdict for verdict in report.verdicts)
+    """A report that Ctrl-C has ended: what is unknown by that, and by no budget, is no matter of the budget."""
+    of_budget = (REASONS["markings"], REASONS["memory"], REASONS["time"])
+    told = (
+        replace(verdict, hint=AGAIN) if verdict.hint == LARGER and not verdict.bound.endswith(of_budget) else verdict
+        for verdict in report.verdicts
+    )
     return replace(report, verdicts=tuple(told))
 
 

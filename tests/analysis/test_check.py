@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from threading import Event
 from typing import Any
@@ -10,12 +11,12 @@ import pytest
 
 from firable.analysis import check as module
 from firable.analysis._engine import IncompleteGraph
-from firable.analysis.check import check
+from firable.analysis.check import AGAIN, check
 from firable.analysis.goal import Limits
 from firable.analysis.methods import GOALS, KNOWERS, SPACES, Method
 from firable.analysis.race import Contestant, Outcome
 from firable.analysis.report import CheckReport, report_on
-from firable.analysis.spaces.reachability import Budget
+from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
 from firable.nets.catalogue import catalogue_net
 from firable.nets.diagnostics import InputError
 from firable.nets.queries import parse_query
@@ -90,10 +91,36 @@ def test_an_interrupted_report_is_made_of_what_is_known(monkeypatch: pytest.Monk
     assert "interrupted" in report.course
     assert len(calls) == 2
     assert report.verdict("deadlock-free").status is Status.PROVED  # known from the exploration
-    calls.clear()
+
+
+@pytest.mark.parametrize(("reason", "is_again"), [("interrupted", True), ("markings", False)])
+def test_what_an_interruption_leaves_unknown_is_no_matter_of_the_budget(
+    monkeypatch: pytest.MonkeyPatch, reason: str, *, is_again: bool
+) -> None:
+    class Ended:
+        """A graph of the engine that has ended so, whatever has ended it."""
+
+        def __init__(self, engine: Any) -> None:
+            self.engine = engine
+            self.reason = reason
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self.engine, name)
+
+    def ended(*of: Any, **by: Any) -> ReachabilityGraph:
+        graph = explore(*of, **by)
+        engine: Any = Ended(graph.engine)
+        return replace(graph, engine=engine)
+
+    def interrupted(*arguments: Any) -> CheckReport:
+        monkeypatch.setattr("firable.analysis.check.report_on", report_on)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("firable.analysis.check.explore", ended)
+    monkeypatch.setattr("firable.analysis.check.report_on", interrupted)
     report = check(catalogue_net("one_robot"), budget=Budget(markings=5), method="explicit")
     assert report.verdict("live").status is Status.UNKNOWN
-    assert report.verdict("live").hint == "ask again, and let it come to its end", "a larger budget would not help"
+    assert (report.verdict("live").hint == AGAIN) is is_again
 
 
 def test_interrupted_twice_ends_all(monkeypatch: pytest.MonkeyPatch) -> None:
