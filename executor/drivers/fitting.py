@@ -102,18 +102,22 @@ def _alike(binding: Binding, places: Iterable[Place]) -> Iterator[Diagnostic]:
 
 
 def _crowded(binding: Binding, places: Iterable[Place]) -> Iterator[Diagnostic]:
-    """Commands of another machine, from another controller, than the first that is given by their channel."""
-    given: dict[tuple[str, str], Place] = {}
+    """Commands of another machine, from another controller, than one that is given by their channel, too."""
+    given: dict[tuple[str, str], list[Place]] = {}
     for place in places:
         bound = binding.document.commands[place.name]
-        first = given.setdefault((bound.device, bound.channel), place)
-        if first.command is None or place.command is None or place.owner == first.owner:
-            continue
-        if place.command.machine != first.command.machine:
-            one, other = first.command.machine, place.command.machine
-            message = f"'{bound.channel}' has commands of '{one}', such as '{first.name}', and here of '{other}'"
+        others = given.setdefault((bound.device, bound.channel), [])
+        machine = _machine(place)
+        if other := next((one for one in others if one.owner != place.owner and _machine(one) != machine), None):
+            such = f"'{_machine(other)}', such as '{other.name}'"
+            message = f"'{bound.channel}' has commands of {such}, and here of '{machine}'"
             hint = "a channel is for one machine, which does one thing at a time: name the channel of this one"
             yield binding.problem("F5102", ("commands", place.name, "channel"), message, hint)
+        others.append(place)
+
+
+def _machine(place: Place) -> str:
+    return "" if place.command is None else place.command.machine
 
 
 def _word(command: Command) -> tuple[str, str]:

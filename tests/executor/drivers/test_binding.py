@@ -360,6 +360,19 @@ def test_a_channel_is_for_one_machine_where_two_controllers_may_give_it_commands
     assert [one.span.line for one in found if one.span is not None] == [19] * is_refused
 
 
+def test_it_is_for_one_machine_in_whatever_order_its_places_stand() -> None:
+    text = NET_TEXT.replace(
+        "transitions:", "  B: {start: x, places: {x: , y: {send: {machine: M, command: RUN}}}}\ntransitions:"
+    )
+    more = "  t4: {from: B.x, to: B.y}\n  t5: {from: B.y, to: B.x}\n"
+    bound = "  B.y: {device: plc, channel: M, write: {holding 2: 9}}\n"
+    for of_move, of_stop in (("M", "N"), ("N", "M")):
+        named = text.replace("machine: M, command: MOVE", f"machine: {of_move}, command: MOVE")
+        named = named.replace("machine: M, command: STOP", f"machine: {of_stop}, command: STOP")
+        found = misfits(parse_binding(GOOD + bound, "c.bind.yaml"), parse_net(named + more))
+        assert [one.code for one in found] == ["F5102"]
+
+
 STOP = "emergency_stop:\n  door: {device: plc, read: discrete 3}\nsignals:"
 
 
