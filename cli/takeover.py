@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -64,15 +64,13 @@ def takeover(
     machines are asked where they are and the operator resumes.
     """
     from firable.executor.journal.memory import HOSTS, remembered
-    from firable.executor.journal.sqlite_journal import SqliteJournal, machines_of, mark_of
+    from firable.executor.journal.sqlite_journal import SqliteJournal, machines_of, mark_of, mark_text
     from firable.executor.journal.takeover import dealt_out, take_over
     from firable.executor.operating.dispatch import TAKEN
     from firable.executor.operating.hosting import machines_of as hosted
     from firable.executor.operating.running import load
     from firable.executor.protocol.deciders import TOP, coordinators
     from firable.nets.bundle import read_bundle
-    from firable.nets.source import printable
-    from firable.nets.writing import write_whole
 
     if len(into) != len(journals):
         raise click.UsageError("name a file --into for each --journal")
@@ -103,15 +101,18 @@ def takeover(
         _demand_reachable(before.net, after.net, moved.marking, budget(max_markings, max_memory, max_seconds))
         targets = dict(zip(journals, into, strict=True))
         written = {targets[file]: names for file, names in dealt.items() if names}
-        marks = [str(mark_of(file)) for file in journals]
-        with _removed_if_it_fails([*marks, *(name for file in written for name in journal_files(file))]):
-            # First of all, so that however this ends the old bundle is not run on beside the new one.
-            for file, mark in zip(journals, marks, strict=True):
-                where = f"in {printable(targets[file])}" if dealt[file] else "without the machines of this host"
-                write_whole(mark, f"'{after.net.name}' goes on {where}\n")
-            if len(journals) == 1 and Path(f"{journals[0]}.cell").is_file():  # the simulated cell, if there is one
-                write_whole(f"{into[0]}.cell", Path(f"{journals[0]}.cell").read_bytes())
-            _write(written, after.digest, moved, {targets[file]: of for file, of in taken.items()})
+        goes_on = {file: targets[file] if dealt[file] else None for file in journals}
+        marks = {str(mark_of(file)): mark_text(after.net.name, target) for file, target in goes_on.items()}
+        cells = {}
+        if len(journals) == 1 and Path(f"{journals[0]}.cell").is_file():  # the simulated cell, if there is one
+            cells = {f"{into[0]}.cell": Path(f"{journals[0]}.cell").read_bytes()}
+        with _removed_if_it_fails([name for file in written for name in journal_files(file)], marks):
+            witnesses, whole = _made(written, after.digest, moved, {targets[file]: of for file, of in taken.items()})
+            # In this order, however this ends: a witness without its journal is refused, so that no host begins the new
+            # bundle anew; a marked journal is refused, so that none runs the old one on; and only then the new ones are
+            # there.
+            for files in (witnesses, marks, {**cells, **whole}):
+                _put_down(files)
     click.echo(f"{', '.join(into)}: '{after.net.name}' goes on with tokens on {', '.join(moved.marking)}")
     if moved.under_way:
         click.echo(f"  under way, and asked after at the start: the commands of {', '.join(moved.under_way)}")
@@ -132,18 +133,38 @@ def takeover(
 
 
 @contextmanager
-def _removed_if_it_fails(names: Collection[str]) -> Iterator[None]:
-    """Leave none of these files, where none stood, unless all is done: part of a cell must not be started."""
+def _removed_if_it_fails(names: Collection[str], marks: Collection[str]) -> Iterator[None]:
+    """Leave none of these files, where none stood, unless all is done: part of a cell must not be started.
+
+    The marks go last, and only where nothing else is left by which the new bundle might be run.
+    """
     from firable.nets.writing import stands
 
-    new = [name for name in names if not stands(name)]
+    new, marked = ([name for name in some if not stands(name)] for some in (names, marks))
     try:
         yield
     except BaseException:
-        for name in new:
-            with suppress(OSError, ValueError):
-                Path(name).unlink(missing_ok=True)
+        _take_away(new)
+        if not any(map(stands, new)):
+            _take_away(marked)
         raise
+
+
+def _take_away(names: Iterable[str]) -> None:
+    for name in names:
+        with suppress(OSError, ValueError):
+            Path(name).unlink(missing_ok=True)
+
+
+def _put_down(files: Mapping[str, bytes | str]) -> None:
+    """Write files whole, and durably before anything that is written behind them."""
+    from firable.executor.journal.sqlite_journal import sync_folder
+    from firable.nets.writing import write_whole
+
+    for file, data in files.items():
+        write_whole(file, data)
+    for folder in {Path(file).parent for file in files}:
+        sync_folder(folder)
 
 
 def _refuse_copies(machines: Mapping[str, Sequence[str]], memories: Mapping[str, Memory]) -> None:
@@ -165,17 +186,16 @@ def _refuse_copies(machines: Mapping[str, Sequence[str]], memories: Mapping[str,
         raise InputError(problems)
 
 
-def _write(
+def _made(
     journals: Mapping[str, Sequence[str]], digest: str, moved: Takeover, taken: Mapping[str, Mapping[str, Stored]]
-) -> None:
-    """Write the journals, with their machines and what these have taken: aside first, so that none is not whole."""
+) -> tuple[dict[str, bytes], dict[str, bytes]]:
+    """The witnesses and the journals, with their machines and what these have taken: made aside, to be whole."""
     from firable.executor.journal.journal import sync_now
     from firable.executor.journal.memory import HOSTS, keeping, new_name
     from firable.executor.journal.sqlite_journal import SqliteJournal, witness_of
     from firable.executor.links.storages import Memory, Met, Storage
     from firable.executor.operating.dispatch import TAKEN
     from firable.executor.protocol.messages import Keep
-    from firable.nets.writing import write_whole
 
     storages = {file: Storage(new_name()) for file in journals}
     of = {name: storages[file] for file, names in journals.items() for name in names}
@@ -195,9 +215,7 @@ def _write(
                     journal.write(HOSTS, keeping(others))
                 sync_now(journal)
             witnesses[str(witness_of(file))], whole[file] = witness_of(written).read_bytes(), written.read_bytes()
-        # A witness without its journal is refused: a host that is to go on does not begin anew where this is killed.
-        for file, data in (*witnesses.items(), *whole.items()):
-            write_whole(file, data)
+    return witnesses, whole
 
 
 def _demand_reachable(old: Net, net: Net, marking: tuple[str, ...], allowed: Budget) -> None:

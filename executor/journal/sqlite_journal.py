@@ -154,6 +154,7 @@ class SqliteJournal:
         run("pragma journal_mode = wal")
         run("pragma synchronous = full")
         run("begin exclusive")
+        _refuse_taken_over(self.path)  # it may have been while this waited
         tables = {name for (name,) in run("select name from sqlite_master where type = 'table'")}
         if not tables and self._durable() == "":  # it was being made, if not now
             for statement in filter(str.strip, _SCHEMA.split(";")):
@@ -167,7 +168,7 @@ class SqliteJournal:
         self._open_witness()
         self._bear_witness(self.generation)
         os.fsync(self.witness_descriptor)  # once, so that a power cut leaves an older number there, and not none
-        _sync_folder(self.path.parent)
+        sync_folder(self.path.parent)
 
     def _open_witness(self) -> None:
         if self.witness_descriptor < 0:
@@ -237,8 +238,13 @@ def witness_of(path: Path | str) -> Path:
 
 
 def mark_of(path: Path | str) -> Path:
-    """The file beside a journal that says, in one line, which bundle goes on from it, and where."""
-    return Path(f"{Path(path)}.taken-over")
+    """The file beside a journal, wherever its name leads, that says which bundle goes on from it, and where."""
+    return Path(f"{os.path.realpath(path)}.taken-over")
+
+
+def mark_text(net: str, journal: Path | str | None) -> str:
+    """What such a file says: which net goes on, and in which journal; in none where it has none of the machines."""
+    return json.dumps({"net": net, "journal": None if journal is None else os.path.realpath(journal)}) + "\n"
 
 
 def machines_of(path: Path | str) -> tuple[str, ...]:
@@ -259,10 +265,25 @@ def machines_of(path: Path | str) -> tuple[str, ...]:
 
 def _refuse_taken_over(path: Path) -> None:
     mark = mark_of(path)
-    if mark.exists():
-        told = printable(mark.read_text("utf-8", "replace").strip())
-        message = f"{printable(str(path))}: the journal was taken over: {told}"
-        raise InputError([Diagnostic("F5036", message, "run that one; both would command the same machines")])
+    if not mark.exists():
+        return
+    try:
+        said = json.loads(mark.read_text("utf-8", "replace"))
+        net, journal = str(said["net"]), said["journal"]
+    except (ValueError, TypeError, KeyError):  # whatever stands there, somebody has put it there
+        net, journal = "another bundle", None
+    where = "" if journal is None else f" in {printable(_from_here(str(journal)))}"
+    message = f"{printable(str(path))}: the journal was taken over: '{printable(net)}' goes on{where}"
+    hint = "run that one; both would command the same machines"
+    if journal is None or not Path(str(journal)).exists():
+        mark_shown = printable(_from_here(str(mark)))
+        hint = f"run it where its journal was brought; only where there is none, remove {mark_shown}, and run this one"
+    raise InputError([Diagnostic("F5036", message, hint)])
+
+
+def _from_here(path: str) -> str:
+    """A path as one would write it here, where that is short."""
+    return os.path.relpath(path) if Path(path).is_relative_to(Path.cwd()) else path
 
 
 _NOTHING: Final = "nothing stands in it"
@@ -323,8 +344,8 @@ def _why_not_opened(path: Path) -> str:
     return ""
 
 
-def _sync_folder(folder: Path) -> None:
-    """Make a file that was made in a folder outlive a power cut."""
+def sync_folder(folder: Path) -> None:
+    """Make the files that were made in a folder outlive a power cut."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sqlite3
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 from support.takeovers import OLD, bundle, joint_marking, journal, old_and_new
@@ -67,6 +69,49 @@ def test_a_journal_that_was_moved_away_from_its_mark_is_not_begun_anew(
     with pytest.raises(InputError, match="F5036"):
         SqliteJournal(before, read_bundle(bundles[0]).digest, (COORDINATOR, "line", "robot", "table"))
     assert not before.exists()
+
+
+def test_a_journal_that_was_taken_over_is_known_by_every_name(
+    bundles: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    digest, machines = read_bundle(bundles[0]).digest, (COORDINATOR, "line", "robot", "table")
+    before = journal(tmp_path / "old.journal", bundles[0], {"robot.worked_out", "table.full"})
+    link = tmp_path / "link"
+    link.symlink_to(before)
+    monkeypatch.chdir(tmp_path)
+    assert main(["takeover", *map(str, bundles), "--journal", "old.journal", "--into", "new.journal"]) == 0
+    Path(f"{link}.generation").symlink_to(f"{before}.generation")
+    for name in (before, link):
+        with pytest.raises(InputError, match=r"F5036.* goes on in new\.journal\n  hint: run that one"):
+            SqliteJournal(name, digest, machines)
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    with pytest.raises(InputError, match=f"'cell' goes on in {tmp_path}/new.journal"):
+        SqliteJournal(before, digest, machines)
+    (tmp_path / "new.journal").unlink()
+    with pytest.raises(InputError, match=f"run it where its journal was brought; .* remove {before}.taken-over"):
+        SqliteJournal(before, digest, machines)
+    Path(f"{before}.taken-over").write_text("by hand")
+    with pytest.raises(InputError, match="'another bundle' goes on"):
+        SqliteJournal(before, digest, machines)
+
+
+def test_a_journal_that_is_taken_over_while_it_is_waited_for_is_not_run_on(
+    bundles: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = journal(tmp_path / "old.journal", bundles[0], {"robot.worked_out", "table.full"})
+    command = ["takeover", *map(str, bundles), "--journal", str(before), "--into", str(tmp_path / "new.journal")]
+    connect = sqlite3.connect
+
+    def taken_over(*of: Any, **by: Any) -> sqlite3.Connection:
+        monkeypatch.undo()
+        assert main(command) == 0
+        made: sqlite3.Connection = connect(*of, **by)
+        return made
+
+    monkeypatch.setattr(sqlite3, "connect", taken_over)
+    with pytest.raises(InputError, match="F5036"):
+        SqliteJournal(before, read_bundle(bundles[0]).digest, (COORDINATOR, "line", "robot", "table"))
 
 
 def test_a_marking_that_the_new_net_never_reaches_is_refused_and_nothing_written(
