@@ -13,7 +13,7 @@ place to which the limit leads, so `within` then says it (`to`); else the limit 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -25,7 +25,8 @@ from firable.nets.time_limits import fault_place_name, fault_transition_name, ti
 from firable.nets.yaml_tree import Mapping as TreeMapping
 from firable.nets.yaml_tree import Node, Scalar, entries_of, items_of, parse_tree, scalars_of, value_of
 
-_WORD: Final = re.compile(r"[^\s()\[\],\"]+")
+_WORD: Final = re.compile(r"(?:(?!->)[^\s()\[\],\">])+")
+"""A word of a formula; an arrow may stand right behind one."""
 _LOCAL: Final = re.compile(r"[\w-]+")
 
 
@@ -38,6 +39,10 @@ class Kind(StrEnum):
     TRANSITION = "transition"
     ARBITER = "arbiter"
     PROPERTY = "property"
+
+
+_NODES: Final = (Kind.PLACE, Kind.SIGNAL, Kind.TRANSITION)
+"""What arcs, gates and formulas tell apart by name; the names of other kinds may be the same."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +59,21 @@ class Occurrence:
     length: int
     prefix: str = ""
     defines: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _Use:
+    """A part of a scalar that is a name, of one of these kinds, but for the prefix that it leaves out."""
+
+    scalar: Scalar
+    kinds: tuple[Kind, ...]
+    prefix: str
+    at: int
+    length: int
+
+    @property
+    def word(self) -> str:
+        return self.scalar.text[self.at : self.at + self.length]
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,12 +112,13 @@ class Names:
     def occurrences(self) -> tuple[Occurrence, ...]:
         """All of them, in the order of the text; a name that is declared nowhere has none, unless a limit gives it."""
         declared = list(self._declared())
-        kinds = {name: one.kind for name, one in self.given.items()} | {one.name: one.kind for one in declared}
+        known = {(one.kind, name) for name, one in self.given.items()} | {(one.kind, one.name) for one in declared}
         found = {(one.line, one.column): one for one in declared}
-        for scalar, prefix, at, length in self._used():
-            word = scalar.text[at : at + length]
-            if (place := self._inside(scalar, at, length)) and (kind := kinds.get(prefix + word)):
-                found.setdefault(place, Occurrence(kind, prefix + word, *place, length, prefix))
+        for use in self._used():
+            name = use.prefix + use.word
+            kind = next((kind for kind in use.kinds if (kind, name) in known), None)
+            if kind and (place := self._inside(use.scalar, use.at, use.length)):
+                found.setdefault(place, Occurrence(kind, name, *place, use.length, use.prefix))
         return tuple(sorted(found.values(), key=lambda one: (one.line, one.column)))
 
     @cached_property
@@ -176,13 +197,20 @@ class Names:
         return self.source.with_parts(parts)
 
     def _with_controller(self, old: str, new: str) -> str:
-        """The text with another name of a controller, also in the full names of its parts."""
-        return self.source.with_parts(
+        """The text with another name of a controller, also in the full names of its parts, those to be among them."""
+        parts = [
             (other.line, other.column, len(old), new)
             for other in self.occurrences
             if (other.kind, other.name) == (Kind.CONTROLLER, old)
             or (not other.prefix and other.name.startswith(f"{old}.") and other.kind is not Kind.CONTROLLER)
-        )
+        ]
+        for _, _, scope in self._scopes():
+            for _, _, body in entries_of(scope, "places"):
+                opens = value_of(body, "opens")
+                for idle in items_of(value_of(opens, "to")) if opens is not None else ():
+                    if idle.text.startswith(f"{old}.") and (place := self._inside(idle, 0, len(old))):
+                        parts.append((*place, len(old), new))
+        return self.source.with_parts(parts)
 
     def _leading_to(self, within: Node, place: str) -> Iterator[tuple[int, int, int, str]]:
         """What makes a time limit name its fault place: in `{...}` as on lines of its own, or for a time alone."""
@@ -198,11 +226,40 @@ class Names:
     def replaced(self, names: Mapping[str, str]) -> str:
         """The text in which each full name that is a key of `names` is used under another; declarations stay."""
         return self.source.with_parts(
-            (*place, length, names[word])
-            for scalar, prefix, at, length in self._used()
-            if not prefix
-            and (word := scalar.text[at : at + length]) in names
-            and (place := self._inside(scalar, at, length))
+            (*place, use.length, names[use.word])
+            for use in self._used()
+            if not use.prefix
+            and use.word in names
+            and Kind.PLACE in use.kinds
+            and (place := self._inside(use.scalar, use.at, use.length))
+        )
+
+    def with_full_roles(self, name: str) -> str:
+        """The text in which what fills the roles of tasks has its full name where it, or the task's place, is one.
+
+        So either can go to another controller, where its short name would mean nothing, or another place.
+        """
+        return self.source.with_parts(
+            (*place, 0, prefix)
+            for _, prefix, scope in self._scopes()
+            for local, _, body in entries_of(scope, "places")
+            for use in self._roles(body, prefix)
+            if use.prefix and name in {prefix + local, prefix + use.word} and (place := self._inside(use.scalar, 0, 1))
+        )
+
+    def _scopes(self) -> Iterator[tuple[str, str, Node]]:
+        """The controllers and the top level: name, the prefix of what is declared there, and where."""
+        yield from ((name, f"{name}.", body) for name, _, body in entries_of(self.tree, "controllers"))
+        yield "", "", self.tree
+
+    @cached_property
+    def _resources(self) -> frozenset[str]:
+        """The full names of the places that say `opens`, which are what the roles of tasks name."""
+        return frozenset(
+            prefix + local
+            for _, prefix, scope in self._scopes()
+            for local, _, body in entries_of(scope, "places")
+            if value_of(body, "opens") is not None
         )
 
     def _declared(self) -> Iterator[Occurrence]:
@@ -236,32 +293,43 @@ class Names:
         if place := self._inside(at, 0, len(at.text)):
             yield Occurrence(kind, name, *place, len(at.text), prefix, defines=True)
 
-    def _used(self) -> Iterator[tuple[Scalar, str, int, int]]:
-        """Scalars, the prefix of what they name, and the part of them that is a name."""
+    def _used(self) -> Iterator[_Use]:
         for name, _, body in entries_of(self.tree, "controllers"):
-            yield from _whole(items_of(value_of(body, "under")), "")
+            yield from _whole(items_of(value_of(body, "under")), "", Kind.CONTROLLER)
             yield from self._used_in(body, f"{name}.")
         yield from self._used_in(self.tree, "")
         for _, _, body in entries_of(self.tree, "transitions"):
             for part in ("from", "to", "if", "unless"):
-                yield from _whole(items_of(value_of(body, part)), "")
+                yield from _whole(items_of(value_of(body, part)), "", *_NODES)
         for _, _, body in entries_of(self.tree, "arbiters"):
-            yield from _whole(items_of(value_of(body, "among")), "")
+            yield from _whole(items_of(value_of(body, "among")), "", Kind.TRANSITION)
         for _, _, body in entries_of(self.tree, "properties"):
             for scalar in scalars_of(body):
-                yield from ((scalar, "", m.start(), len(m.group())) for m in _WORD.finditer(scalar.text))
+                yield from (_Use(scalar, _NODES, "", m.start(), len(m.group())) for m in _WORD.finditer(scalar.text))
         for name, key, _ in entries_of(self.tree, "expect"):
-            begin = len(name) - len(name.removeprefix("loop.").removeprefix("property."))
-            yield key, "", begin, len(name) - begin
+            family, dot, of = name.removeprefix("loop.").partition(".")
+            if family + dot == "property.":
+                yield _Use(key, (Kind.PROPERTY,), "", len(name) - len(of), len(of))
 
-    def _used_in(self, scope: Node, prefix: str) -> Iterator[tuple[Scalar, str, int, int]]:
-        yield from _whole(items_of(value_of(scope, "start")), prefix)
+    def _used_in(self, scope: Node, prefix: str) -> Iterator[_Use]:
+        yield from _whole(items_of(value_of(scope, "start")), prefix, Kind.PLACE)
         for _, _, body in entries_of(scope, "places"):
-            yield from _whole(items_of(value_of(body, "until")), prefix)
+            yield from _whole(items_of(value_of(body, "until")), prefix, Kind.SIGNAL)
             if (within := value_of(body, "within")) is not None:
-                yield from _whole(items_of(value_of(within, "to")), prefix)
-            if (task := value_of(body, "task")) is not None:
-                yield from _whole(scalars_of(task), "")
+                yield from _whole(items_of(value_of(within, "to")), prefix, Kind.PLACE)
+            yield from self._roles(body, prefix)
+
+    def _roles(self, body: Node, prefix: str) -> Iterator[_Use]:
+        """What fills the roles of a place's task: resources, by their short names if they have one here.
+
+        The name of the task and the texts of its parameters are no names of the net, though they may read like one.
+        """
+        for key, _, value in entries_of(body, "task"):
+            for scalar in scalars_of(value) if key != "name" else ():
+                if prefix + scalar.text in self._resources:
+                    yield from _whole([scalar], prefix, Kind.PLACE)
+                elif scalar.text in self._resources:
+                    yield from _whole([scalar], "", Kind.PLACE)
 
     def _inside(self, scalar: Scalar, at: int, length: int) -> tuple[int, int] | None:
         """Line and column of a part of a scalar, where the scalar stands in the text letter by letter."""
@@ -274,5 +342,5 @@ class Names:
         return scalar.line, begin + at + 1
 
 
-def _whole(scalars: Iterator[Scalar], prefix: str) -> Iterator[tuple[Scalar, str, int, int]]:
-    return ((scalar, prefix, 0, len(scalar.text)) for scalar in scalars)
+def _whole(scalars: Iterable[Scalar], prefix: str, *kinds: Kind) -> Iterator[_Use]:
+    return (_Use(scalar, kinds, prefix, 0, len(scalar.text)) for scalar in scalars)

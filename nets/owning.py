@@ -1,10 +1,10 @@
 """Giving a net owners: the same net, in which each place and signal belongs to a controller and bears its name.
 
 An owned thing is named `controller.thing`, so owning renames it wherever it stands: in arcs, gates, completions,
-timers and formulas. The name within the controller is the one it had before, without its former owner; where two of one
-controller would then have the same name, the former owner stays in it (`robot_free`, `mc_free`). The description of a
-fault transition names the completion, and follows it. Nothing else changes: the net with owners has the same markings
-under other names.
+timers, formulas and the roles of tasks. The name within the controller is the one it had before, without its former
+owner; where two of one controller would then have the same name, the former owner stays in it (`robot_free`,
+`mc_free`). The description of a fault transition names the completion, and follows it. Nothing else changes: the net
+with owners has the same markings under other names.
 
 Rejected: owners beside the names, as a table of their own. A reader of `robot.free` sees whose it is, and so does a
 diff.
@@ -19,7 +19,7 @@ from itertools import starmap
 from typing import Any
 
 from firable.nets.formula import Count, Holds
-from firable.nets.net import Controller, Net, Place, Signal, Transition
+from firable.nets.net import Controller, Net, Place, Signal, TaskUse, Transition
 from firable.nets.time_limits import fault_transition
 
 
@@ -52,6 +52,7 @@ def with_owners(net: Net, owner_of: Mapping[str, str], controllers: Sequence[Con
             owner=owner_of[place.name],
             completion=None if place.completion is None else named[place.completion],
             within=None if place.within is None else replace(place.within, timer=named[place.within.timer]),
+            task=_with_roles(net, place, owner_of[place.name], named),
         )
         for place in net.places
     )
@@ -75,6 +76,26 @@ def with_owners(net: Net, owner_of: Mapping[str, str], controllers: Sequence[Con
         net.description,
         net.expected,
     )
+
+
+def resource_of(net: Net, place: Place, name: str) -> str | None:
+    """The resource place that an argument of a task names, local to the controller of the task's place or in full."""
+    for full in (name if place.owner is None else f"{place.owner}.{name}", name):
+        if full in net.place_index and net.place(full).resource:
+            return full
+    return None
+
+
+def _with_roles(net: Net, place: Place, owner: str, named: Mapping[str, str]) -> TaskUse | None:
+    """What fills the roles of a place's task, renamed; a name stays short where both are of one controller again."""
+
+    def role(name: str) -> str:
+        if (full := resource_of(net, place, name)) is None:
+            return name
+        return named[full] if name == full else named[full].removeprefix(f"{owner}.")
+
+    arguments = () if place.task is None else place.task.arguments
+    return place.task and replace(place.task, arguments=tuple((key, role(name)) for key, name in arguments))
 
 
 def _told(place: Place) -> str:

@@ -13,6 +13,7 @@ from typing import Final
 
 from firable.nets.diagnostics import Diagnostic, InputError, Subject, did_you_mean
 from firable.nets.net import Net, Place, TaskUse
+from firable.nets.owning import resource_of
 from firable.nets.tasks.model import Catalogue, Subtask, Task
 from firable.nets.tasks.text import filled, names_in_template
 
@@ -100,14 +101,6 @@ def tasks_used(net: Net, catalogue: Catalogue) -> tuple[Task, ...]:
             order[name] = catalogue[name]
             todo += [subtask.use.name for subtask in catalogue[name].subtasks]
     return tuple(order.values())
-
-
-def resource_of(net: Net, place: Place, name: str) -> str | None:
-    """The resource place that an argument names, local to the controller of the task's place or in full."""
-    for full in (name if place.owner is None else f"{place.owner}.{name}", name):
-        if full in net.place_index and net.place(full).resource:
-            return full
-    return None
 
 
 def _bound(net: Net, place: Place, use: TaskUse, task: Task) -> Binding:

@@ -6,14 +6,15 @@ transitions as well, and a property that speaks of it stays, so that the reader 
 
 Moving a place to another controller changes what is named after its controller: the place, its completion, and
 what its time limit gives. A completion that another place of the old controller waits for too stays there under its
-name, for there it is still declared.
+name, for there it is still declared. What fills the role of a task by a short name is written in full. A place that a
+time limit leads to stays where the limit is: what the limit would lead to then is another place.
 
 Rejected: a `Net` that is edited and printed. The file would be another one, without its comments and in another order.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Final
 
 from firable.nets.changes import Arbitration, CapacityPlace, Change, Gate
@@ -137,18 +138,23 @@ def own(source: Source, kind: Kind, name: str, owner: str | None) -> Source:
     if kind is Kind.SIGNAL:
         return _own_sensor(source, name, owner)
     scope, local = _declared(source, name, "places")
-    to, text = _scope(source, owner), YamlText(source)
+    to = _scope(source, owner)
     if scope == to:
         return source
+    for of, fault in _limits(source, scope):
+        if local in {of, fault}:
+            raise _leads_there(of, fault, "both are of one controller: move both in the text of the file")
+    renamed = _moved_names(YamlText(source), scope, local, owner)
+    source = Source(source.file, Names(source).with_full_roles(name))
+    text = YamlText(Source(source.file, Names(source).replaced(renamed)))
     marked = local in names_in(text.at((*scope, "start")))
-    renamed = _moved_names(text, scope, local, owner)
     raw = text.raw((*scope, "places", local))
     if marked:
         text = text.without_item(scope, "start", local)
     text = text.with_entry((*to, "places"), local, raw).without_entry((*scope, "places", local))
     if marked:
         text = text.with_item(to, "start", local, _before("start", SCOPE_KEYS))
-    return Source(source.file, Names(text.source).replaced(renamed))
+    return text.source
 
 
 def owned(source: Source, kind: Kind, name: str, owner: str | None) -> Mapping[str, str]:
@@ -163,6 +169,9 @@ def delete(source: Source, kind: Kind, name: str) -> Source:
     match kind:
         case Kind.PLACE:
             scope, local = _declared(source, name, "places")
+            for of, fault in _limits(source, scope):
+                if local == fault:
+                    raise _leads_there(of, fault, "declared or not: delete its `within` in the text of the file first")
             text = _cut_off(mark(source, name, marked=False), name)
             return text.without_entry((*scope, "places", local)).source
         case Kind.SIGNAL:
@@ -197,6 +206,20 @@ def _own_sensor(source: Source, name: str, owner: str | None) -> Source:
     text = YamlText(source).without_item(scope, "inputs", local)
     text = text.with_item(to, "inputs", local, _before("inputs", SCOPE_KEYS))
     return Source(source.file, Names(text.source).replaced({name: _full(owner, local)}))
+
+
+def _limits(source: Source, scope: Path) -> Iterator[tuple[str, str]]:
+    """The places of a controller with a time limit that leads to a declared place, and that one."""
+    places = YamlText(source).at((*scope, "places"))
+    for name, body in places.items():
+        if isinstance(body, dict) and (within := body.get("within")):
+            fault = (within.get("to") if isinstance(within, dict) else None) or fault_place_name(name)
+            if fault in places:
+                yield name, fault
+
+
+def _leads_there(name: str, fault: str, hint: str) -> InputError:
+    return InputError([Diagnostic("F1020", f"the time limit of '{name}' leads to '{fault}'", hint)])
 
 
 def _moved_names(text: YamlText, scope: Path, local: str, owner: str | None) -> Mapping[str, str]:

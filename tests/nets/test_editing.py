@@ -307,6 +307,70 @@ def test_a_completion_that_others_wait_for_stays_with_them() -> None:
     assert "robot.touch" in {gate.signal for gate in net.transition("G4").external}
 
 
+CONCEPTUAL = """\
+firable: 1
+cell: demo
+controllers:
+  system:
+    start: [cv1, robot]
+    places:
+      loading: {task: {name: load, robot: robot, source: cv1}}
+      leaving: {task: {name: leave, robot: system.robot}}
+      cv1:     {opens: {to: conveyor.cv1, machine: CV1}}
+      robot:   {opens: {to: robot.free, machine: R}}
+  robot:
+  conveyor:
+transitions: {}
+"""
+
+
+@pytest.mark.parametrize(
+    ("place", "owner", "loading", "leaving"),
+    [
+        ("system.robot", "robot", ["robot.robot", "cv1"], ["robot.robot"]),
+        ("system.cv1", None, ["robot", "cv1"], ["system.robot"]),
+        ("system.loading", "robot", ["system.robot", "system.cv1"], ["system.robot"]),
+    ],
+)
+def test_what_fills_the_role_of_a_task_is_the_same_place_after_it_was_moved(
+    place: str, owner: str | None, loading: list[str], leaving: list[str]
+) -> None:
+    net = parse_net(edited(CONCEPTUAL, lambda s: edits.own(s, Kind.PLACE, place, owner)))
+    told = {each.task.name: [role for _, role in each.task.arguments] for each in net.places if each.task}
+    assert told == {"load": loading, "leave": leaving}
+
+
+LIMITED = """\
+firable: 1
+cell: demo
+controllers:
+  robot:
+    start: free
+    places:
+      free:
+      busy: {send: {machine: R, command: MOVE}, until: at_home, within: 5s}
+      busy_fault: {description: late}
+  mc:
+transitions:
+  go: {from: robot.free, to: robot.busy}
+  back: {from: robot.busy, to: robot.free}
+  again: {from: robot.busy_fault, to: robot.free}
+"""
+
+
+@pytest.mark.parametrize(("limit", "fault"), [("5s", "busy_fault"), ("{time: 5s, to: late}", "late")])
+def test_no_edit_makes_a_time_limit_lead_to_another_place(limit: str, fault: str) -> None:
+    text = LIMITED.replace("5s", limit).replace("busy_fault", fault)
+    assert parse_net(text).transition("robot.busy_timeout").outputs == (f"robot.{fault}",)
+    for edit in (
+        lambda s: edits.own(s, Kind.PLACE, "robot.busy", "mc"),
+        lambda s: edits.own(s, Kind.PLACE, f"robot.{fault}", "mc"),
+        lambda s: edits.delete(s, Kind.PLACE, f"robot.{fault}"),
+    ):
+        with pytest.raises(InputError, match=f"the time limit of 'busy' leads to '{fault}'"):
+            edited(text, edit)
+
+
 @pytest.mark.parametrize(
     ("edit", "code"),
     [

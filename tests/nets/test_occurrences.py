@@ -224,3 +224,60 @@ def test_a_word_that_is_quoted_or_part_of_a_formula_is_found_where_it_stands() -
     assert no is not None
     assert "  property.never_both: violated" in names.renamed(no, "never_both")
     assert replace(no, line=8, column=3, defines=True) in names.of(no)
+
+
+CONCEPTUAL = """\
+firable: 1
+cell: demo
+controllers:
+  system:
+    coordinator: true
+    start: [cv1, robot]
+    places:
+      loading: {task: {name: load, robot: robot, source: system.cv1, program: load}}
+      cv1:     {opens: {to: conveyor.cv1, machine: CV1}}
+      robot:   {opens: {to: robot.free, machine: R}}
+  robot:    {under: system}
+  conveyor:
+transitions:
+  load: {from: [system.cv1, system.robot], to: system.loading}
+properties:
+  robot: {reachable: system.loading->system.robot}
+expect: {property.robot: violated}
+"""
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "new", "parts"),
+    [
+        (
+            Kind.PLACE,
+            "system.cv1",
+            "belt",
+            ["[belt, robot]", "source: system.belt", "      belt:     {opens", "from: [system.belt, "],
+        ),
+        (
+            Kind.PLACE,
+            "system.robot",
+            "arm",
+            ["[cv1, arm]", "robot: arm,", "      arm:   {opens", ", system.arm]", "->system.arm}"],
+        ),
+        (Kind.TRANSITION, "load", "start", ["  start: {from"]),
+        (Kind.CONTROLLER, "robot", "arm", ["{to: arm.free", "  arm:    {under"]),
+        (Kind.CONTROLLER, "conveyor", "belts", ["{to: belts.cv1", "  belts:"]),
+        (Kind.PROPERTY, "robot", "loads", ["  loads: {reachable", "{property.loads: "]),
+    ],
+)
+def test_what_reads_like_a_name_and_is_none_of_its_kind_is_left_as_it_is(
+    kind: Kind, name: str, new: str, parts: list[str]
+) -> None:
+    names = names_in(CONCEPTUAL)
+    one = next(one for one in names.occurrences if one.defines and (one.kind, one.name) == (kind, name))
+    text = names.renamed(one, new)
+    old = name.rpartition(".")[2]
+    expected = CONCEPTUAL
+    for part in parts:
+        assert expected.count(part.replace(new, old)) == 1
+        expected = expected.replace(part.replace(new, old), part)
+    assert text == expected
+    assert parse_net(text).name == "demo"
