@@ -102,8 +102,9 @@ class Playing:
         if stage is None or asked.get("scene") is None:
             return moment.told(self.player, now)
         scene = stage.of_json(asked["scene"])
-        if (became := asked.get("became")) in now.signals:
-            scene = stage.signal(scene, str(became))
+        became = asked.get("became")
+        if isinstance(became, str) and became in now.signals:
+            scene = stage.signal(scene, became)
         return {**moment.told(self.player, now), "top": stage.told(scene)}
 
     async def fire(self, asked: dict[str, Any]) -> dict[str, Any]:

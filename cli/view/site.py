@@ -76,8 +76,8 @@ async def _asked(request: web.Request) -> dict[str, Any]:
     if request.method == "GET":
         return {}
     try:
-        asked = json.loads(await request.text())
-    except (ValueError, RecursionError):
+        asked = json.loads(await request.read())  # in UTF-8, whatever the request says of its charset
+    except (ValueError, RecursionError, web.RequestPayloadError):
         asked = None
     if not isinstance(asked, dict):
         raise refusal("a request that is no JSON object")

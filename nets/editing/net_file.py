@@ -47,15 +47,15 @@ class NetFile:
         return os.access(self.path, os.W_OK)
 
     def written(self, text: str) -> NetFile:
-        """The file with another text, on the disk; line ends are those that it had.
+        """The file with another text, on the disk; where it had other line ends than that, they are those that it had.
 
         Raises `InputError`: F1019 where the file is not what was read any more, F1017 where it cannot be written.
         """
         if not self.is_current():
             message = f"{self.path} has been changed by somebody else since it was read"
             raise InputError([Diagnostic("F1019", message, "read it again; what was to be written is not")])
-        if "\r\n" in self.source.text:
-            text = text.replace("\r\n", "\n").replace("\n", "\r\n")
+        if "\r\n" in self.source.text and "\r\n" not in text:  # as a browser hands it over
+            text = text.replace("\n", "\r\n")
         data = (codecs.BOM_UTF8 if self.has_mark else b"") + text.encode()
         write_whole(self.path, data)
         return NetFile(self.path, Source(self.source.file, text), _version(data), self.has_mark)

@@ -344,6 +344,20 @@ def test_a_request_that_makes_no_sense_is_refused_with_a_code(late: str, path: s
     assert answer["errors"][0]["code"] == "F5070"
 
 
+def test_no_request_of_who_may_ask_is_an_error_of_the_server(late: str) -> None:
+    scene = asked(late, "api/page")[1]["top"]["scene"]
+    assert asked(late, "api/moment", {**BEGIN, "scene": scene, "became": [{}]})[0] == 200
+    base, _, token = late.partition("#token=")
+    for name, value in (("Content-Type", "text/plain; charset=no-such"), ("Content-Encoding", "gzip")):
+        request = urllib.request.Request(f"{base}api/run", b'{"name": "none"}')
+        request.add_header("Authorization", f"Bearer {token}")
+        request.add_header(name, value)
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            urllib.request.urlopen(request, timeout=60)
+        with refused.value as answer:
+            assert (answer.code, json.loads(answer.read())["errors"][0]["code"]) == (422, "F5070")
+
+
 def test_a_firing_is_one_of_the_reference_player_and_clears_what_is_stale() -> None:
     net = catalogue_net("one_robot")
     player = Player(net)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Dialog, Page, Route, expect
 from support.browser import PATIENCE_MS, browser, command, needs_browser, page_at
 
 from firable.cli.main import main
@@ -236,6 +236,55 @@ def test_a_file_that_somebody_else_has_changed_is_not_written_over(
         expect(page.get_by_role("button", name="Undo")).to_be_disabled()
         file.write_text(TEXT)
         expect(page.locator(".banner")).to_contain_text("The file has been changed on the disk.")
+
+
+@needs_browser
+def test_a_file_with_line_ends_of_windows_is_edited_and_keeps_them(
+    chromium: Browser, served: tuple[str, Path], file: Path
+) -> None:
+    ends = b"# a comment\n" + TEXT.replace("\n", "\r\n").encode()  # and one of another editor
+    file.write_bytes(ends)
+    assert asked(served[0], "reload", {})[0] == 200
+    with page_at(chromium, served[0]) as page:
+        begin(page, ends.decode().replace("\r\n", "\n"))
+        page.get_by_label("Chosen").select_option("transition:back")
+        page.get_by_role("button", name="Delete back").click()
+        done(page, "back deleted")
+        gone = b"  back: {from: robot.busy, to: robot.free}   # and back\r\n"
+        assert file.read_bytes() == ends.replace(gone, b"")
+        page.get_by_role("button", name="Undo").click()
+        expect(page.locator(".status")).to_have_text("Undone: back deleted.")
+        assert file.read_bytes() == ends
+
+
+@needs_browser
+def test_what_is_typed_while_a_text_is_written_is_not_lost(
+    chromium: Browser, served: tuple[str, Path], file: Path
+) -> None:
+    with page_at(chromium, served[0]) as page:
+        begin(page)
+        answers: list[Route] = []
+        page.route("**/api/edit/text", lambda route: answers.append(route))
+        text = page.get_by_label("Text of the net file")
+        text.fill(TEXT + "# one\n")
+        page.keyboard.press("Control+s")
+        text.fill(TEXT + "# one\n# two\n")
+        page.wait_for_timeout(50)  # it lets the browser tell of its request
+        answers[0].continue_()
+        done(page, "the text")
+        assert file.read_text() == TEXT + "# one\n"
+        expect(text).to_have_value(TEXT + "# one\n# two\n")
+        asked_first: list[str] = []
+
+        def no(dialog: Dialog) -> None:
+            asked_first.append(dialog.message)
+            dialog.dismiss()
+
+        page.once("dialog", no)
+        file.write_text(TEXT)
+        page.get_by_role("button", name="Load it again").click()
+        expect(text).to_have_value(TEXT + "# one\n# two\n")
+        assert "not written" in asked_first[0]
 
 
 def test_what_gets_another_name_keeps_its_place_in_the_layout_file(served: tuple[str, Path], file: Path) -> None:

@@ -51,22 +51,22 @@ export class Edit {
     this.details = new Details((what) => void this.does(what), (chosen) => this.choose(chosen));
     this.frame.side.append(panel("Chosen", this.details.chosenPanel), panel("Add", this.details.addPanel));
     this.pane = new TextPane(state.text, {
-      save: (text) => void this.ask("api/edit/text", { text }),
+      save: (text) => void this.ask("api/edit/text", { text }, undefined, text),
       try_: async (text) => (await ask<{ errors: Problem[] }>("api/edit/try", { text })).errors,
       changed: () => this.frame.banner.replaceChildren(),
     });
     this.frame.below.append(this.pane.element);
     addEventListener("keydown", (event) => this.key(event), { signal: this.frame.gone });
     addEventListener("beforeunload", (event) => this.pane.dirty && event.preventDefault(), { signal: this.frame.gone });
-    watchFile(this.frame, () => void this.ask("api/edit/reload", {}));
+    watchFile(this.frame, () => this.reload());
     this.show();
   }
 
   /** A text that is no net: it is shown with what is wrong, and not written. */
-  refuse(problems: Problem[], draft: string): void {
+  refuse(problems: Problem[], draft: string, sent: string | null = null): void {
     const words = problems.length === 1 ? problems[0]!.message : `${problems[0]?.message ?? ""}, and ${problems.length - 1} more`;
     banner(this.frame.banner, "bad", `This is no net, and nothing is written: ${words}. Mend it in the text below, or discard it.`);
-    this.pane.refuse(problems, draft);
+    this.pane.refuse(problems, draft, sent);
   }
 
   private does(what: Doing): Promise<void> {
@@ -77,8 +77,13 @@ export class Edit {
     return this.ask(`api/edit/${which}`, {});
   }
 
-  /** Ask for an edit, after all that was asked for before it. */
-  private ask(path: string, body: object, then?: Chosen): Promise<void> {
+  private reload(): void {
+    if (this.pane.dirty && !confirm("What is typed in the text is not written. Load the file in its place?")) return;
+    void this.ask("api/edit/reload", {});
+  }
+
+  /** Ask for an edit, after all that was asked for before it; `sent` is the text that was typed, if that is one. */
+  private ask(path: string, body: object, then?: Chosen, sent: string | null = null): Promise<void> {
     this.queue = this.queue.then(async () => {
       if (path !== "api/edit/text" && path !== "api/edit/reload" && this.pane.dirty) {
         banner(this.frame.banner, "open", "The text below is not written: save it or discard it first.");
@@ -87,10 +92,10 @@ export class Edit {
       this.frame.banner.replaceChildren();
       try {
         const answer = await ask<Edited>(path, { version: this.state.version, ...body, then: undefined });
-        if ("page" in answer) this.takeOver(answer, then);
+        if ("page" in answer) this.takeOver(answer, then, sent);
         else {
           if (answer.version !== null) this.state = { ...this.state, version: answer.version };
-          this.refuse(answer.errors, answer.draft);
+          this.refuse(answer.errors, answer.draft, sent);
         }
       } catch (error) {
         this.fail(error);
@@ -104,19 +109,19 @@ export class Edit {
       banner(this.frame.banner, "bad", "The connection is lost: is `firable view` still running?");
       return;
     }
-    const again = h("button", { type: "button", class: "reload", click: () => void this.ask("api/edit/reload", {}) }, "Load it again");
+    const again = h("button", { type: "button", class: "reload", click: () => this.reload() }, "Load it again");
     const stale = error.problems.some((one) => one.code === "F1019");
     const words = error.problems.map((one) => `${one.message}${one.hint ? ` (${one.hint})` : ""}`).join("; ") || error.message;
     banner(this.frame.banner, "bad", `${words}.`, ...(stale ? [again] : []));
     this.show();
   }
 
-  private takeOver({ page, edit }: { page: PlayPage; edit: EditState }, then?: Chosen): void {
+  private takeOver({ page, edit }: { page: PlayPage; edit: EditState }, then: Chosen | undefined, sent: string | null): void {
     const before = this.state;
     this.page = page;
     this.state = edit;
     void this.drawing.draw(page.net, []);
-    this.pane.take(edit.text);
+    this.pane.take(edit.text, sent);
     const last = edit.redo !== null && edit.redo === before.undo ? `Undone: ${edit.redo}` : `Done: ${edit.undo ?? "loaded again"}`;
     this.frame.status.textContent = `${last}.`;
     announce(`${last}.`);

@@ -24,7 +24,8 @@ export class TextPane {
     text: string,
     private readonly on: { save: (text: string) => void; try_: (text: string) => Promise<Problem[]>; changed: () => void },
   ) {
-    this.saved = this.area.value = text;
+    this.area.value = text;
+    this.saved = this.area.value; // with the line ends of a text area, whatever those of the file are
     this.element = h("details", { class: "text-pane", open: innerHeight > 700 },
       h("summary", {}, h("h2", {}, "Text of the file"), " ", this.state),
       h("div", { class: "editor" }, this.gutter, this.area),
@@ -39,11 +40,18 @@ export class TextPane {
     return this.area.value !== this.saved;
   }
 
-  /** The file has another text now; its first line that is new is shown. */
-  take(text: string): void {
+  /** The file has another text now; its first line that is new is shown. What was typed since `sent` is kept. */
+  take(text: string, sent: string | null): void {
     const before = this.saved.split("\n");
-    const after = text.split("\n");
-    this.saved = this.area.value = text;
+    const typed = this.area.value;
+    this.area.value = text;
+    this.saved = this.area.value;
+    if (sent !== null && typed !== sent) {
+      this.area.value = typed;
+      this.show([]);
+      return;
+    }
+    const after = this.saved.split("\n");
     const at = after.findIndex((line, i) => line !== before[i]);
     this.show([]);
     if (at < 0) return;
@@ -51,9 +59,9 @@ export class TextPane {
     this.area.scrollTop = Math.max(0, at - 3) * this.lineHeight();
   }
 
-  /** A text that is no net: not written, to be mended here. */
-  refuse(problems: Problem[], draft: string): void {
-    this.area.value = draft;
+  /** A text that is no net: not written, to be mended here. What was typed since `sent` is kept. */
+  refuse(problems: Problem[], draft: string, sent: string | null): void {
+    if (sent === null || this.area.value === sent) this.area.value = draft;
     this.element.open = true;
     this.show(problems);
     const first = problems.find((one) => one.line !== null);
@@ -108,9 +116,12 @@ export class TextPane {
   private goTo(one: Problem): void {
     const lines = this.area.value.split("\n");
     const line = Math.min(one.line ?? 1, lines.length);
-    const begin = lines.slice(0, line - 1).reduce((sum, text) => sum + text.length + 1, 0) + (one.column ?? 1) - 1;
+    const begin = lines.slice(0, line - 1).reduce((sum, text) => sum + text.length + 1, 0);
+    const characters = [...(lines[line - 1] ?? "")]; // columns count these, and a text area counts halves of some
+    const units = (end: number): number => characters.slice(0, end).join("").length;
+    const column = (one.column ?? 1) - 1;
     this.area.focus();
-    this.area.setSelectionRange(begin, begin + Math.max(1, one.length ?? 1));
+    this.area.setSelectionRange(begin + units(column), begin + units(column + Math.max(1, one.length ?? 1)));
     this.area.scrollTop = Math.max(0, line - 4) * this.lineHeight();
   }
 
