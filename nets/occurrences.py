@@ -227,11 +227,8 @@ class Names:
         """The text in which each full name that is a key of `names` is used under another; declarations stay."""
         return self.source.with_parts(
             (*place, use.length, names[use.word])
-            for use in self._used()
-            if not use.prefix
-            and use.word in names
-            and Kind.PLACE in use.kinds
-            and (place := self._inside(use.scalar, use.at, use.length))
+            for use in self._used_in_full()
+            if use.word in names and Kind.PLACE in use.kinds and (place := self._inside(use.scalar, use.at, use.length))
         )
 
     def with_full_roles(self, name: str) -> str:
@@ -294,10 +291,21 @@ class Names:
             yield Occurrence(kind, name, *place, len(at.text), prefix, defines=True)
 
     def _used(self) -> Iterator[_Use]:
-        for name, _, body in entries_of(self.tree, "controllers"):
-            yield from _whole(items_of(value_of(body, "under")), "", Kind.CONTROLLER)
-            yield from self._used_in(body, f"{name}.")
-        yield from self._used_in(self.tree, "")
+        for _, prefix, scope in self._scopes():
+            yield from _whole(items_of(value_of(scope, "start")), prefix, Kind.PLACE)
+            for _, _, body in entries_of(scope, "places"):
+                yield from _whole(items_of(value_of(body, "until")), prefix, Kind.SIGNAL)
+                if (within := value_of(body, "within")) is not None:
+                    yield from _whole(items_of(value_of(within, "to")), prefix, Kind.PLACE)
+                yield from (use for use in self._roles(body, prefix) if use.prefix)
+        yield from self._used_in_full()
+
+    def _used_in_full(self) -> Iterator[_Use]:
+        """Where names stand that are full ones, whatever is declared around them."""
+        for _, prefix, scope in self._scopes():
+            yield from _whole(items_of(value_of(scope, "under")), "", Kind.CONTROLLER)
+            for _, _, body in entries_of(scope, "places"):
+                yield from (use for use in self._roles(body, prefix) if not use.prefix)
         for _, _, body in entries_of(self.tree, "transitions"):
             for part in ("from", "to", "if", "unless"):
                 yield from _whole(items_of(value_of(body, part)), "", *_NODES)
@@ -310,14 +318,6 @@ class Names:
             family, dot, of = name.removeprefix("loop.").partition(".")
             if family + dot == "property.":
                 yield _Use(key, (Kind.PROPERTY,), "", len(name) - len(of), len(of))
-
-    def _used_in(self, scope: Node, prefix: str) -> Iterator[_Use]:
-        yield from _whole(items_of(value_of(scope, "start")), prefix, Kind.PLACE)
-        for _, _, body in entries_of(scope, "places"):
-            yield from _whole(items_of(value_of(body, "until")), prefix, Kind.SIGNAL)
-            if (within := value_of(body, "within")) is not None:
-                yield from _whole(items_of(value_of(within, "to")), prefix, Kind.PLACE)
-            yield from self._roles(body, prefix)
 
     def _roles(self, body: Node, prefix: str) -> Iterator[_Use]:
         """What fills the roles of a place's task: resources, by their short names if they have one here.

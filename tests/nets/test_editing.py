@@ -340,6 +340,13 @@ def test_what_fills_the_role_of_a_task_is_the_same_place_after_it_was_moved(
     assert told == {"load": loading, "leave": leaving}
 
 
+def test_a_place_of_nobody_that_holds_a_token_goes_to_a_controller_with_it() -> None:
+    text = FLOW.replace("places:", "controllers: {robot: }\nplaces:").replace("start: p", "start: [q, p]")
+    net = parse_net(edited(text, lambda s: edits.own(s, Kind.PLACE, "p", "robot")))
+    assert [(place.name, place.marked) for place in net.places] == [("robot.p", True), ("q", True)]
+    assert net.transition("t").inputs == ("robot.p",)
+
+
 LIMITED = """\
 firable: 1
 cell: demo
