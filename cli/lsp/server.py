@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import asyncio
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from difflib import SequenceMatcher
 from io import StringIO
@@ -30,12 +30,13 @@ from firable.cli.lsp.hover import hover
 from firable.cli.report import Report
 from firable.cli.text import reasons
 from firable.nets.diagnostics import Diagnostic, InputError, Span
+from firable.nets.drawing.layout_file import SIZE_BYTES_MAX as LAYOUT_BYTES_MAX
 from firable.nets.drawing.layout_file import layout_path, renamed_layout
 from firable.nets.editing import edits
 from firable.nets.net import Net
 from firable.nets.occurrences import Kind, Names, Occurrence
 from firable.nets.rules import rule_of
-from firable.nets.source import Source
+from firable.nets.source import Source, read_source
 from firable.nets.text import parse_positioned
 from firable.nets.text_positions import Positions
 from firable.nets.verdict import Cure, Verdict
@@ -162,9 +163,9 @@ class NetServer(LanguageServer):
             told.append((lsp.Diagnostic(at, words, severity, rule_of(verdict), source="firable check"), verdict.cures))
         return told
 
-    def edit(self, uri: str, text: str) -> lsp.WorkspaceEdit:
+    def edit(self, uri: str, text: str, old_text: str) -> lsp.WorkspaceEdit:
         """Another text in a file, by the lines that are others: the cursor and what is folded stay as they were."""
-        old, new = _lines(self.source(uri).text), _lines(text)
+        old, new = _lines(old_text), _lines(text)
         changes = [
             lsp.TextEdit(lsp.Range(lsp.Position(begin, 0), lsp.Position(end, 0)), "".join(new[start:stop]))
             for what, begin, end, start, stop in SequenceMatcher(None, old, new, autojunk=False).get_opcodes()
@@ -179,11 +180,12 @@ class NetServer(LanguageServer):
             return edit
         there = beside.as_uri()
         try:
-            source = self.source(there)
+            is_open = there in self.workspace.text_documents
+            source = self.source(there) if is_open else read_source(beside, LAYOUT_BYTES_MAX)
             text = renamed_layout(source, names)
         except InputError:
             return edit
-        more = self.edit(there, text).changes or {} if text != source.text else {}
+        more = self.edit(there, text, source.text).changes or {} if text != source.text else {}
         return lsp.WorkspaceEdit(changes={**edit.changes, **more})
 
 
@@ -209,13 +211,14 @@ async def _look(uri: str) -> None:
     net, positions = parse_positioned(source.text, source.file)
     try:
         found = await asyncio.to_thread(_checked, net)
-        if not _show(uri, source, server.told(uri, found, found.verdicts, positions)):
+        if not _show(uri, source, lambda: server.told(uri, found, found.verdicts, positions)):
             return
         verdicts = await asyncio.to_thread(explained, found)
         if verdicts != found.verdicts:
-            _show(uri, source, server.told(uri, found, verdicts, positions))
+            _show(uri, source, lambda: server.told(uri, found, verdicts, positions))
     except InputError as error:  # such as of an `expect:` that names no verdict
-        _show(uri, source, [(server.diagnostic(uri, one), ()) for one in error.diagnostics])
+        problems = error.diagnostics
+        _show(uri, source, lambda: [(server.diagnostic(uri, one), ()) for one in problems])
 
 
 def _checked(net: Net) -> CheckReport:
@@ -225,11 +228,15 @@ def _checked(net: Net) -> CheckReport:
     return check(net, budget=Budget(seconds=SECONDS))
 
 
-def _show(uri: str, source: Source, told: list[_Told]) -> bool:
-    """Publish what was found of a text, if it is still the one in the editor."""
+def _show(uri: str, source: Source, tell: Callable[[], list[_Told]]) -> bool:
+    """Publish what was found of a text, if it is still the one in the editor; whether it did.
+
+    Of a file that is closed nothing is asked: it may be nowhere on the disk.
+    """
     opened = server.opened.get(uri)
     if opened is None or server.source(uri).text != source.text:
         return False
+    told = tell()
     opened.checked, opened.cures = source.text, [(one, cure) for one, cures in told for cure in cures]
     server.publish(uri, [one for one, _ in told])
     return True
@@ -256,8 +263,9 @@ def did_change(params: lsp.DidChangeTextDocumentParams) -> None:
 
 @server.feature(lsp.TEXT_DOCUMENT_DID_CLOSE)
 def did_close(params: lsp.DidCloseTextDocumentParams) -> None:
-    """Forget a file."""
+    """Forget a file, and take back what was told of it: its text may never have been written."""
     server.opened.pop(params.text_document.uri, None)
+    server.text_document_publish_diagnostics(lsp.PublishDiagnosticsParams(params.text_document.uri, []))
 
 
 @server.feature(lsp.TEXT_DOCUMENT_HOVER)
@@ -314,7 +322,7 @@ def rename(params: lsp.RenameParams) -> lsp.WorkspaceEdit | None:
         parse_positioned(text, source.file)
     except InputError as error:
         raise JsonRpcInvalidParams(error.diagnostics[0].message) from None
-    return server.with_layout(server.edit(uri, text), uri, names)
+    return server.with_layout(server.edit(uri, text, source.text), uri, names)
 
 
 @server.feature(lsp.TEXT_DOCUMENT_CODE_ACTION, lsp.CodeActionOptions([lsp.CodeActionKind.QuickFix]))
@@ -339,7 +347,9 @@ def cures(params: lsp.CodeActionParams) -> list[lsp.CodeAction]:
         except InputError:
             continue  # it is told in words; where it would stand in the text is no form that is edited by itself
         title = "; and ".join(cure.changes)
-        found[cure.changes] = lsp.CodeAction(title, lsp.CodeActionKind.QuickFix, [told], edit=server.edit(uri, text))
+        found[cure.changes] = lsp.CodeAction(
+            title, lsp.CodeActionKind.QuickFix, [told], edit=server.edit(uri, text, source.text)
+        )
     return list(found.values())
 
 

@@ -12,7 +12,9 @@ from lsprotocol import types as lsp
 from pygls.exceptions import JsonRpcException
 from pygls.lsp.client import LanguageClient
 
+from firable.cli.lsp.server import _show
 from firable.nets.catalogue import catalogue_path
+from firable.nets.source import Source
 
 LATE = catalogue_path("one_robot_mc_late").read_text("utf-8")
 
@@ -197,6 +199,40 @@ def test_a_rename_changes_the_text_or_says_why_not(tmp_path: Path, within: Withi
             await one.client.text_document_rename_async(lsp.RenameParams(one.document, here, "on"))
 
     within(tmp_path / "cell.firable.yaml", act)
+
+
+@pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf", b"# no text: \xff\n"])
+def test_a_rename_keeps_the_line_ends_of_a_layout_file_and_passes_one_over_that_is_no_text(
+    tmp_path: Path, within: Within, mark: bytes
+) -> None:
+    layout = "firable_layout: 1\r\nrows: [[G3]]\r\n"
+    beside = tmp_path / "cell.layout.yaml"
+    beside.write_bytes(mark + layout.encode())
+
+    async def act(one: Editor) -> None:
+        one.open(LATE)
+        here = one.at(LATE, "G3", "transitions:").position
+        edit = await one.client.text_document_rename_async(lsp.RenameParams(one.document, here, "take"))
+        assert edit is not None
+        assert edit.changes is not None
+        if b"#" in mark:
+            assert list(edit.changes) == [one.uri]
+        else:
+            assert applied(layout, edit.changes[beside.as_uri()]) == layout.replace("G3", "take")
+
+    within(tmp_path / "cell.firable.yaml", act)
+
+
+def test_a_file_that_is_closed_has_no_diagnostics_any_more_and_is_not_asked_for(tmp_path: Path, within: Within) -> None:
+    async def act(one: Editor) -> None:
+        one.open(LATE.replace("firable: 1", "firable: 2"))
+        await one.told(bool)
+        one.client.text_document_did_close(lsp.DidCloseTextDocumentParams(one.document))
+        await one.told(lambda found: not found)
+
+    within(tmp_path / "never_written.firable.yaml", act)
+    source = Source("closed", LATE)
+    assert not _show("untitled:closed", source, lambda: pytest.fail("it is nowhere on the disk"))
 
 
 def test_a_cure_is_offered_as_an_action_while_the_text_is_the_checked_one(tmp_path: Path, within: Within) -> None:
