@@ -286,7 +286,10 @@ def answer_all(
     makers: Sequence[Callable[[], Report]],
     show: Callable[[Report], None],
 ) -> int:
-    """Make several reports, printing each as text as soon as it is there, or all as one document of another format."""
+    """Make several reports, printing each as text as soon as it is there, or all as one document of another format.
+
+    Where nobody reads what is printed any more (`firable check ... | head`), the files that are asked for still are.
+    """
     from firable.cli.text import show_errors
     from firable.nets.diagnostics import InputError
 
@@ -294,6 +297,7 @@ def answer_all(
     reports: list[Report] = []
     errors: list[Diagnostic] = []
     as_text = format_ in {"text", "github"}
+    unread: BrokenPipeError | None = None
     for make in makers:
         try:
             report = make()
@@ -303,12 +307,19 @@ def answer_all(
                 show_errors(error.diagnostics)
             continue
         reports.append(report)
-        if as_text:
-            show(report)
+        if as_text and unread is None:
+            try:
+                show(report)
+            except BrokenPipeError as error:
+                if not written:
+                    raise
+                unread = error
     code = worst([*(report.exit_code for report in reports), *map(exit_code_of, errors)])
     outcome = Outcome(command, reports, errors, code)
     for kind, file in written:
         write_text(file, _rendered(kind, outcome))
+    if unread is not None:
+        raise unread
     if format_ != "text":
         click.echo(_rendered(format_, outcome), nl=False)
     return code
