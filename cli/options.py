@@ -344,4 +344,6 @@ def _rendered(format_: str, outcome: Outcome) -> str:
             import json
 
             data = document(outcome.command, outcome.reports, outcome.errors, outcome.exit_code)
-            return json.dumps(data, indent=2, ensure_ascii=False) + "\n"
+            text = json.dumps(data, indent=2, ensure_ascii=False) + "\n"
+            # The bytes of a file's name that are no UTF-8 stand as escapes, as they would in ASCII.
+            return text.encode(errors="backslashreplace").decode()

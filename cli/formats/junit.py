@@ -30,7 +30,7 @@ def junit(outcome: Outcome) -> str:
     if outcome.errors:
         suite = TestSuite("input")
         for error in outcome.errors:
-            case = TestCase(str(error.span or "input"), "input")
+            case = TestCase(_clean(str(error.span or "input")), "input")
             case.result = [Error(_clean(error.message), error.code)]
             case.result[0].text = _clean(str(error))
             suite.add_testcase(case)

@@ -54,7 +54,8 @@ def page_of(report: Report) -> str:
         tag("main", written),
         _foot(report),
     )
-    return f"<!DOCTYPE html>\n{tag('html', head, body, lang='en')}\n"
+    text = f"<!DOCTYPE html>\n{tag('html', head, body, lang='en')}\n"
+    return text.encode(errors="replace").decode()  # the name of a file may hold bytes that are no UTF-8
 
 
 def _masthead(report: Report) -> Markup:

@@ -85,6 +85,22 @@ def test_sarif_is_what_its_schema_says(
     assert bool(log["runs"][0]["results"]) is (code != 0)
 
 
+def test_the_name_of_a_file_may_hold_bytes_that_are_no_text(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    late, bad = "late\udcff.firable.yaml", "bad\udcff.firable.yaml"
+    (here / "nets/late.firable.yaml").rename(late)
+    Path(bad).write_text("firable: [", "utf-8")
+    files = {kind: here / f"report.{kind}" for kind in ("json", "sarif", "junit")}
+    printed(capsys, *(word for kind, file in files.items() for word in ("--write", kind, str(file))), late, bad, code=2)
+    told = json.loads(files["json"].read_text("utf-8"))
+    assert [report["input"] for report in told["reports"]] == [late]
+    places = [result["locations"][0]["physicalLocation"] for result in results(files["sarif"].read_text("utf-8"))]
+    assert {place["artifactLocation"]["uri"] for place in places} == {"late%FF.firable.yaml", "bad%FF.firable.yaml"}
+    names = [case.name for suite in JUnitXml.fromfile(str(files["junit"])) for case in suite]
+    assert "bad\N{REPLACEMENT CHARACTER}.firable.yaml:1:11" in names
+    printed(capsys, "--report", "page.html", late, code=1)
+    assert "late?.firable.yaml" in Path("page.html").read_text("utf-8")
+
+
 def test_the_schema_refuses_what_is_no_sarif(schema: Any) -> None:
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.Draft7Validator(schema).validate({"version": "2.1.0", "runs": [{"results": []}]})
