@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -30,11 +31,30 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addini("firable_max_seconds", "Give up on a net after so many seconds; what is unknown fails.", default="")
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Refuse a setting that is none, once and before any test."""
+    _seconds_max(config)
+
+
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> NetFile | None:
     """Collect a net file."""
     if not file_path.name.endswith(_SUFFIXES) or not parent.config.getini("firable_collect"):
         return None
     return NetFile.from_parent(parent, path=file_path)
+
+
+def _seconds_max(config: pytest.Config) -> float | None:
+    """How long a net is checked; raises `pytest.UsageError` where the setting is no number of seconds."""
+    given = config.getini("firable_max_seconds")
+    if not given:
+        return None
+    try:
+        seconds = float(given)
+    except ValueError:
+        seconds = -1.0
+    if not 0 <= seconds < inf:
+        raise pytest.UsageError(f"firable_max_seconds: '{given}' is no number of seconds")
+    return seconds
 
 
 class NetFile(pytest.File):
@@ -55,13 +75,8 @@ class NetFile(pytest.File):
         from firable.analysis.spaces.reachability import Budget
         from firable.nets.verdict import held_to
 
-        given = self.config.getini("firable_max_seconds")
-        try:
-            seconds = float(given) if given else None
-        except ValueError:
-            raise pytest.UsageError(f"firable_max_seconds: '{given}' is no number of seconds") from None
         with self.loaded.placing():
-            verdicts = explained(check(self.loaded.net, budget=Budget(seconds=seconds)))
+            verdicts = explained(check(self.loaded.net, budget=Budget(seconds=_seconds_max(self.config))))
             return {verdict.name: verdict for verdict in held_to(self.loaded.net.expected, verdicts)}
 
     def collect(self) -> Iterator[NetTest]:

@@ -310,8 +310,15 @@ def test_settings_turn_collecting_off_and_bound_the_time(pytester: pytest.Pytest
     told = outcomes(pytester, "large.firable.yaml", "-v")[1]
     assert "large.firable.yaml::deadlock-free FAILED" in told
     assert "? unknown   deadlock-free" in told
-    pytester.makeini("[pytest]\nfirable_max_seconds = soon\n")
-    assert "'soon' is no number of seconds" in outcomes(pytester)[1]
+
+
+@pytest.mark.parametrize("seconds", ["soon", "-1", "nan", "inf"])
+def test_a_bound_that_is_no_number_of_seconds_is_refused_once(pytester: pytest.Pytester, seconds: str) -> None:
+    (pytester.path / "late.firable.yaml").write_text(LATE, "utf-8")
+    pytester.makeini(f"[pytest]\nfirable_max_seconds = {seconds}\n")
+    ended = pytester.runpytest_subprocess(*PLUGIN)
+    assert ended.ret is pytest.ExitCode.USAGE_ERROR
+    ended.stderr.fnmatch_lines([f"ERROR: firable_max_seconds: '{seconds}' is no number of seconds"])
 
 
 def test_the_plugin_is_announced_to_pytest() -> None:
