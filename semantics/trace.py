@@ -32,6 +32,8 @@ from firable.semantics.player import Player
 
 VERSION: Final = 1
 SIZE_BYTES_MAX: Final = 2**30
+SECONDS_MAX: Final = 1e11
+"""Three thousand years: a time beyond has no date, and is that of no run."""
 
 
 class Discipline(StrEnum):
@@ -258,7 +260,7 @@ class _Reader:
                 if version != VERSION:
                     raise self.failure(1, line, f"version {version} of the trace format is not known")
                 machines, began = data.get("machines", []), data.get("began", 0.0)
-                if _are_names(machines) and isinstance(began, int | float):
+                if _are_names(machines) and isinstance(began, int | float) and 0 <= began <= SECONDS_MAX:
                     kind, start = Discipline(discipline), self._start(line, data.get("start"))
                     return Header(net, digest, kind, signals, commands, tuple(machines), float(began), start)
         raise self.failure(1, line, "not the header of a trace")
@@ -275,6 +277,8 @@ class _Reader:
 
     def event(self, number: int, line: str) -> Event | End:
         data = self.record(number, line)
+        if isinstance(at := data.get("at"), float | int) and not abs(at) <= SECONDS_MAX:
+            raise self.failure(number, line, "no run lasts so long")
         match data:
             case {"at": float() | int() as at, "fired": list(names)} if (
                 names and all(isinstance(n, str) for n in names) and isinstance(data.get("round"), int | None)

@@ -21,7 +21,7 @@ _TRANSITIONS: Final = 1
 
 def perfetto(course: Course) -> str:
     """The course of a run as a JSON object with `traceEvents`."""
-    rows = ",\n".join(json.dumps(event, ensure_ascii=False) for event in _events(course))
+    rows = ",\n".join(json.dumps(event) for event in _events(course))
     head = json.dumps({"net": course.net.name, "complete": course.complete})
     return f'{{"displayTimeUnit": "ms", "otherData": {head}, "traceEvents": [\n{rows}\n]}}\n'
 

@@ -169,6 +169,15 @@ def _name(case: ET.Element) -> str:
     return next(part.attrib["value"] for part in case if part.attrib["key"] == "concept:name")
 
 
+def test_a_note_that_is_no_text_goes_into_every_format(folder: Path, tmp_path: Path) -> None:
+    header, *rest = (folder / "t").read_text("utf-8").splitlines()
+    note = r'{"at": 0, "note": "fault", "message": "half of a pair: \ud800"}'
+    trace = tmp_path / "noted.trace.jsonl"
+    trace.write_text("\n".join((header, note, *rest)) + "\n", "utf-8")
+    for name in ("run.svg", "run.vcd", "run.perfetto.json", "run.xes"):
+        assert main(["timeline", str(trace), "--net", str(folder / "b"), "-o", str(tmp_path / name)]) == 0
+
+
 def test_what_a_format_cannot_carry_is_said(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name in ("run.vcd", "run.perfetto.json", "run.xes"):
         assert main(["timeline", str(folder / "t"), "--net", str(folder / "b"), "-o", str(folder / name)]) == 0

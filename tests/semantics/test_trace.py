@@ -1,6 +1,7 @@
 """Traces are read back as written, and replayed against the net."""
 
 import io
+import json
 
 import pytest
 
@@ -184,12 +185,22 @@ def test_a_trace_that_was_cut_off_replays_as_incomplete() -> None:
         '{"at": 0, "signal": "done", "value": 2}',
         "[" * 100_000,
         '{"at": NaN, "note": "x"}',
+        '{"at": 1e400, "note": "x"}',
+        f'{{"at": {10**400}, "note": "x"}}',
+        '{"at": 1e12, "fired": ["go"]}',
     ],
 )
 def test_a_malformed_line_is_named(line: str) -> None:
     header = text_of(trace()).splitlines()[0]
     with pytest.raises(InputError, match=r"<trace>:2:1: error\[F5005\]"):
         parse_trace(f"{header}\n{line}\n")
+
+
+@pytest.mark.parametrize("began", [-1, 1e12, 10**400])
+def test_a_run_that_began_at_no_date_is_none(began: float) -> None:
+    header = {**json.loads(text_of(trace()).splitlines()[0]), "began": began}
+    with pytest.raises(InputError, match=r"<trace>:1:1: error\[F5005\]"):
+        parse_trace(json.dumps(header) + "\n")
 
 
 def test_a_file_that_does_not_begin_with_a_header_is_no_trace() -> None:
