@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import asyncio
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import SequenceMatcher
 from io import StringIO
@@ -46,6 +46,9 @@ if TYPE_CHECKING:
 
 SECONDS: Final = 5.0
 """How long a net that was opened or saved is checked."""
+
+CHANGE_SECONDS: Final = 0.05
+"""How long it is waited after a change whether another follows."""
 
 _SYMBOLS: Final = {
     Kind.CONTROLLER: lsp.SymbolKind.Class,
@@ -88,6 +91,7 @@ class NetServer(LanguageServer):
     def __init__(self) -> None:
         super().__init__("firable", __version__)
         self.opened: dict[str, _Opened] = {}
+        self.divided: tuple[str, Sequence[str]] | None = None
 
     def source(self, uri: str) -> Source:
         """The text of a file as it stands in the editor."""
@@ -104,7 +108,15 @@ class NetServer(LanguageServer):
         """A part of a line (from 1) in the units of the client."""
         document = self.workspace.get_text_document(uri)
         start, end = lsp.Position(line - 1, column - 1), lsp.Position(line - 1, column - 1 + length)
-        return document.position_codec.range_to_client_units(document.lines, lsp.Range(start, end))
+        return document.position_codec.range_to_client_units(self.lines(uri), lsp.Range(start, end))
+
+    def lines(self, uri: str) -> Sequence[str]:
+        """The lines of a file, kept while its text stays: a document divides it anew each time."""
+        document = self.workspace.get_text_document(uri)
+        text = document.source
+        if self.divided is None or self.divided[0] is not text:
+            self.divided = text, document.lines
+        return self.divided[1]
 
     def of_span(self, uri: str, span: Span | None) -> lsp.Range:
         """The range of a span; the first character where there is none."""
@@ -120,7 +132,7 @@ class NetServer(LanguageServer):
         if names is None:
             return None
         document = self.workspace.get_text_document(uri)
-        here = document.position_codec.position_from_client_units(document.lines, position)
+        here = document.position_codec.position_from_client_units(self.lines(uri), position)
         one = names.at(here.line + 1, here.character + 1)
         return None if one is None else (names, one)
 
@@ -168,8 +180,7 @@ class NetServer(LanguageServer):
         old, new = _lines(old_text), _lines(text)
         changes = [
             lsp.TextEdit(lsp.Range(lsp.Position(begin, 0), lsp.Position(end, 0)), "".join(new[start:stop]))
-            for what, begin, end, start, stop in SequenceMatcher(None, old, new, autojunk=False).get_opcodes()
-            if what != "equal"
+            for begin, end, start, stop in _changed(old, new)
         ]
         return lsp.WorkspaceEdit(changes={uri: changes})
 
@@ -192,6 +203,16 @@ class NetServer(LanguageServer):
 def _lines(text: str) -> list[str]:
     """The lines of the protocol, with their ends; `str.splitlines` knows more ends than it does."""
     return StringIO(text, newline="").readlines()
+
+
+def _changed(old: list[str], new: list[str]) -> Iterator[tuple[int, int, int, int]]:
+    """The lines that are others, from and to which in both texts."""
+    if len(old) == len(new):  # as after nearly every rename; to look for the shortest way takes long in a long file
+        yield from ((i, i + 1, i, i + 1) for i in range(len(old)) if old[i] != new[i])
+        return
+    for what, begin, end, start, stop in SequenceMatcher(None, old, new).get_opcodes():
+        if what != "equal":
+            yield begin, end, start, stop
 
 
 server = NetServer()
@@ -255,10 +276,15 @@ async def did_save(params: lsp.DidSaveTextDocumentParams) -> None:
 
 
 @server.feature(lsp.TEXT_DOCUMENT_DID_CHANGE)
-def did_change(params: lsp.DidChangeTextDocumentParams) -> None:
-    """Read a file that is being changed; verdicts are of the text as it was saved, and told anew then."""
+async def did_change(params: lsp.DidChangeTextDocumentParams) -> None:
+    """Read a file that is being changed; verdicts are of the text as it was saved, and told anew then.
+
+    Of changes that come faster than a large file is read, the last is.
+    """
     uri = params.text_document.uri
-    server.publish(uri, server.read(uri))
+    await asyncio.sleep(CHANGE_SECONDS)
+    if server.workspace.get_text_document(uri).version == params.text_document.version:
+        server.publish(uri, server.read(uri))
 
 
 @server.feature(lsp.TEXT_DOCUMENT_DID_CLOSE)

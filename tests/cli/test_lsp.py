@@ -12,7 +12,7 @@ from lsprotocol import types as lsp
 from pygls.exceptions import JsonRpcException
 from pygls.lsp.client import LanguageClient
 
-from firable.cli.lsp.server import _show
+from firable.cli.lsp.server import _changed, _show
 from firable.nets.catalogue import catalogue_path
 from firable.nets.source import Source
 
@@ -221,6 +221,46 @@ def test_a_rename_keeps_the_line_ends_of_a_layout_file_and_passes_one_over_that_
             assert applied(layout, edit.changes[beside.as_uri()]) == layout.replace("G3", "take")
 
     within(tmp_path / "cell.firable.yaml", act)
+
+
+def test_a_long_file_is_renamed_in_and_its_names_are_listed_at_once(tmp_path: Path, within: Within) -> None:
+    """Of 20,000 lines; both took a quarter of a minute, for lines that repeat and lines that are counted anew."""
+    places = "".join(f"  p{i}:\n    description: a place\n\n" for i in range(2000))
+    arcs = "".join(
+        f"  t{i}:\n    from:\n      - p{i}\n    to:\n      - p{i - 1}\n    description: further\n\n"
+        for i in range(1, 2000)
+    )
+    text = f"cell: c\nplaces:\n{places}start: p1\ntransitions:\n{arcs}"
+
+    async def act(one: Editor) -> None:
+        one.open(text)  # of no version yet, so that nothing is checked meanwhile
+        assert len(await one.told(bool)) == 1
+        found = await asyncio.wait_for(
+            one.client.text_document_document_symbol_async(lsp.DocumentSymbolParams(one.document)), 10
+        )
+        assert found is not None
+        assert len(found) == 3999
+        one.change(f"firable: 1\n{text}")
+        await one.told(lambda found: not found)
+        params = lsp.RenameParams(one.document, one.at(f"firable: 1\n{text}", "p7").position, "seven")
+        edit = await asyncio.wait_for(one.client.text_document_rename_async(params), 10)
+        assert edit is not None
+        assert edit.changes is not None
+        assert sorted(each.new_text.strip() for each in edit.changes[one.uri]) == ["- seven", "- seven", "seven:"]
+
+    within(tmp_path / "cell.firable.yaml", act)
+
+
+@pytest.mark.parametrize("new", ["a\nB\nc\nD\n", "a\nb\nnew\nc\nd\n", "", "a\nb\nc\nd"])
+def test_the_lines_that_are_others_are_found(new: str) -> None:
+    old = ["a\n", "b\n", "c\n", "d\n"]
+    made, at = list[str](), 0
+    lines = new.splitlines(keepends=True)
+    for begin, end, start, stop in _changed(old, lines):
+        assert old[begin:end] != lines[start:stop]
+        made += [*old[at:begin], *lines[start:stop]]
+        at = end
+    assert [*made, *old[at:]] == lines
 
 
 def test_a_file_that_is_closed_has_no_diagnostics_any_more_and_is_not_asked_for(tmp_path: Path, within: Within) -> None:
