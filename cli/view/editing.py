@@ -9,8 +9,8 @@ Who may edit: whoever may see, on this host, and only the one net file that `fir
 file beside it the names that change. A net of the
 catalogue, PNML and bundles are not edited, and with `--read-only` nothing is.
 
-Steps are undone here and not in the page, so that a reload of the window loses none. A file that was read again begins
-anew: what another program has written is not undone from here.
+Steps are undone here and not in the page, so that a reload of the window loses none, and another window has them too. A
+file that another program has written begins anew when it is read again: that is not undone from here.
 """
 
 from __future__ import annotations
@@ -98,6 +98,7 @@ class Editing:
         return {
             "text": self.file.source.text,
             "version": self.file.version,
+            "shown": self.playing.shown,
             "undo": self.done[-1].what if self.done else None,
             "redo": self.undone[-1].what if self.undone else None,
             "arcs": arcs,
@@ -105,8 +106,9 @@ class Editing:
         }
 
     async def version(self, _: Asked) -> dict[str, Any]:
-        """Whether the file is still what is shown."""
-        return {"current": self.file is not None and await asyncio.to_thread(self.file.is_current)}
+        """Whether the file is still what is shown, and which of the nets that it was is."""
+        current = self.file is not None and await asyncio.to_thread(self.file.is_current)
+        return {"current": current, "shown": self.playing.shown}
 
     async def edit(self, asked: Asked) -> dict[str, Any]:
         """One edit of the net."""
@@ -145,13 +147,17 @@ class Editing:
     async def reload(self, _: Asked) -> dict[str, Any]:
         """The file as it is on the disk now; where it is no net, it comes back as a draft."""
         async with self.one_at_a_time:
-            self.file = file = NetFile.read(self._file().path)
-            self.done.clear()
-            self.undone.clear()
+            before = self._file()
+            self.file = file = NetFile.read(before.path)
+            is_known = file.version == before.version
+            if not is_known:
+                self.done.clear()
+                self.undone.clear()
             try:
-                self._take(await asyncio.to_thread(_read, file.source))
+                loaded = await asyncio.to_thread(_read, file.source)
             except InputError as error:
                 return _draft(error, file.source.text, version=file.version)
+            self._take(loaded, is_another=not is_known or loaded.net != self.playing.loaded.net)
             return await self._shown()
 
     def _cure_of(self, asked: Asked) -> tuple[Edit, str]:
@@ -202,7 +208,7 @@ class Editing:
         self._take(loaded, names)
         return await self._shown()
 
-    def _take(self, loaded: Loaded, names: Mapping[str, str] = NO_NAMES) -> None:
+    def _take(self, loaded: Loaded, names: Mapping[str, str] = NO_NAMES, *, is_another: bool = True) -> None:
         """Show another net, arranged by the layout file beside it; what got other names keeps its position there.
 
         A layout file that cannot be read, or written, is left as it is: the net is what is edited, and it is written.
@@ -215,7 +221,8 @@ class Editing:
                 if (text := renamed_layout(source, names)) != source.text:
                     write_whole(path, text)
                 given = parse_layout(text, source.file)
-        self.playing.take(loaded, Look(given, tuple(names.get(name, name) for name in look.folded)))
+        look = Look(given, tuple(names.get(name, name) for name in look.folded))
+        self.playing.take(loaded, look, is_another=is_another)
 
     async def _shown(self) -> dict[str, Any]:
         return {"page": await self.playing.page({}), "edit": await self.state({})}

@@ -14,6 +14,7 @@ from aiohttp import web
 
 from firable.cli.view import moment
 from firable.cli.view.drawing import PLAIN, Look, Pictures
+from firable.cli.view.moment import Moment
 from firable.cli.view.runs import Run, checked, verdict_json
 from firable.cli.view.scene import Stage
 from firable.cli.view.site import BODY_BYTES_MAX, PUBLIC, answering, file_routes, refusal
@@ -32,6 +33,8 @@ class Playing:
         self, loaded: Loaded, file: str, runs: Iterable[Run] = (), plant: PlantModel | str = "", look: Look = PLAIN
     ) -> None:
         self.loaded = loaded
+        self.shown = 0
+        """How often another net has taken the place of one, by which a window knows that it shows an older one."""
         self.file = file
         self.pictures = Pictures(loaded.net, look)
         self.runs = list(runs)
@@ -41,9 +44,10 @@ class Playing:
         self.verdicts: tuple[Verdict, ...] | None = None
         self.checking = asyncio.Lock()
 
-    def take(self, loaded: Loaded, look: Look | None = None) -> None:
+    def take(self, loaded: Loaded, look: Look | None = None, *, is_another: bool = True) -> None:
         """Another net, after an edit; nothing that was found of the one before is known of it."""
         self.loaded = loaded
+        self.shown += is_another
         self.pictures = Pictures(loaded.net, look or self.pictures.look)
         self.player = Player(loaded.net)
         self.verdicts = None
@@ -84,6 +88,7 @@ class Playing:
             "mode": "play",
             "file": self.file,
             "editable": self.editable,
+            "shown": self.shown,
             "net": moment.structure(net),
             "moment": moment.told(self.player, moment.begin(net)),
             "runs": [run.summary() for run in self.runs],
@@ -97,8 +102,7 @@ class Playing:
 
     async def moment(self, asked: dict[str, Any]) -> dict[str, Any]:
         """What may fire at a moment, and how the cell looks once a signal that `became` names has become 1."""
-        now = moment.moment_of(self.player.net, asked)
-        stage = self.stage
+        now, stage = self._now(asked), self.stage
         if stage is None or asked.get("scene") is None:
             return moment.told(self.player, now)
         scene = stage.of_json(asked["scene"])
@@ -110,11 +114,17 @@ class Playing:
     async def fire(self, asked: dict[str, Any]) -> dict[str, Any]:
         """The moment after a firing."""
         name, stage = str(asked.get("transition", "")), self.stage
-        after, done = moment.fired(self.player, moment.moment_of(self.player.net, asked), name)
+        after, done = moment.fired(self.player, self._now(asked), name)
         shown = {**moment.told(self.player, after), **done}
         if stage is not None and asked.get("scene") is not None:
             shown["top"] = stage.told(stage.fired(stage.of_json(asked["scene"]), (name,), sends=True))
         return shown
+
+    def _now(self, asked: dict[str, Any]) -> Moment:
+        """The moment that a request names; raises `InputError` F5070 where it is one of a net that was edited since."""
+        if asked.get("shown", self.shown) != self.shown:
+            raise refusal("the net has been edited in another window")
+        return moment.moment_of(self.player.net, asked)
 
     async def check(self, _: dict[str, Any]) -> dict[str, Any]:
         """Check the net, once: a net that is not edited gets the same verdicts."""

@@ -239,6 +239,38 @@ def test_a_file_that_somebody_else_has_changed_is_not_written_over(
 
 
 @needs_browser
+def test_an_edit_in_another_window_is_told_and_can_be_undone_in_both(
+    chromium: Browser, served: tuple[str, Path], file: Path
+) -> None:
+    address = served[0]
+    with page_at(chromium, address) as playing, page_at(chromium, address) as editing:
+        begin(editing)
+        version = asked(address, "")[1]["version"]
+        gone = {"do": "delete", "kind": "transition", "name": "back", "version": version}
+        assert asked(address, "", gone)[0] == 200
+        expect(editing.locator(".banner")).to_contain_text("The net has been edited in another window.")
+        expect(playing.locator(".banner")).to_contain_text("The net has been edited in another window.")
+        playing.locator('button[data-transition="go"]').click()
+        expect(playing.get_by_role("alert")).to_contain_text("the net has been edited in another window")
+        editing.get_by_role("button", name="Load it again").click()
+        expect(editing.locator('[id="transition:back"]')).to_have_count(0)
+        editing.get_by_role("button", name="Undo").click()
+        expect(editing.locator(".status")).to_have_text("Undone: back deleted.")
+        assert file.read_text() == TEXT
+
+
+def test_to_load_a_file_again_that_nobody_has_changed_changes_nothing(served: tuple[str, Path], file: Path) -> None:
+    address = served[0]
+    added = {"do": "add", "kind": "transition", "name": "more", "version": asked(address, "")[1]["version"]}
+    before = asked(address, "", added)[1]
+    assert asked(address, "reload", {})[1] == before
+    file.write_text(TEXT)
+    after = asked(address, "reload", {})[1]
+    assert after["edit"]["undo"] is None
+    assert after["page"]["shown"] > before["page"]["shown"]
+
+
+@needs_browser
 def test_a_file_with_line_ends_of_windows_is_edited_and_keeps_them(
     chromium: Browser, served: tuple[str, Path], file: Path
 ) -> None:

@@ -27,6 +27,7 @@ export class Edit {
   private tool: Tool = "choose";
   private first: Chosen | null = null;
   private queue: Promise<void> = Promise.resolve();
+  private asking = false;
 
   constructor(private page: PlayPage, private state: EditState, done: () => void) {
     this.drawing = new Drawing(page.net, {
@@ -58,7 +59,7 @@ export class Edit {
     this.frame.below.append(this.pane.element);
     addEventListener("keydown", (event) => this.key(event), { signal: this.frame.gone });
     addEventListener("beforeunload", (event) => this.pane.dirty && event.preventDefault(), { signal: this.frame.gone });
-    watchFile(this.frame, () => this.reload());
+    watchFile(this.frame, () => this.shown, () => this.reload());
     this.show();
   }
 
@@ -67,6 +68,11 @@ export class Edit {
     const words = problems.length === 1 ? problems[0]!.message : `${problems[0]?.message ?? ""}, and ${problems.length - 1} more`;
     banner(this.frame.banner, "bad", `This is no net, and nothing is written: ${words}. Mend it in the text below, or discard it.`);
     this.pane.refuse(problems, draft, sent);
+  }
+
+  /** The net that is shown; while an edit is on its way none, for the server may have another already. */
+  private get shown(): number {
+    return this.asking ? NaN : this.page.shown;
   }
 
   private does(what: Doing): Promise<void> {
@@ -90,6 +96,7 @@ export class Edit {
         return;
       }
       this.frame.banner.replaceChildren();
+      this.asking = true;
       try {
         const answer = await ask<Edited>(path, { version: this.state.version, ...body, then: undefined });
         if ("page" in answer) this.takeOver(answer, then, sent);
@@ -99,6 +106,8 @@ export class Edit {
         }
       } catch (error) {
         this.fail(error);
+      } finally {
+        this.asking = false;
       }
     });
     return this.queue;

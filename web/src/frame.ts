@@ -92,13 +92,16 @@ export function frame(title: string, says: string, kind: string, drawing: Drawin
   return { tools, below, side, status, banner, hint, gone };
 }
 
-/** Look every two seconds whether the file is still what is shown, and say where it is not. */
-export function watchFile(where: Frame, reload: () => void): void {
+/** Look every two seconds whether the file, and the net that the server has of it, are still what is shown; say where not. */
+export function watchFile(where: Frame, shown: () => number, reload: () => void): void {
   const timer = setInterval(() => {
     if (document.hidden || where.banner.querySelector(".reload") !== null) return;
-    ask<{ current: boolean }>("api/edit/version").then(({ current }) => {
-      if (current || where.gone.aborted) return;
-      banner(where.banner, "open", "The file has been changed on the disk.", h("button", { type: "button", class: "reload", click: reload }, "Load it again"));
+    const before = shown();
+    ask<{ current: boolean; shown: number }>("api/edit/version").then((now) => {
+      // While this window waits for an edit of its own, the server may have it already.
+      if ((now.current && now.shown === before) || before !== shown() || where.gone.aborted) return;
+      const words = now.current ? "The net has been edited in another window." : "The file has been changed on the disk.";
+      banner(where.banner, "open", words, h("button", { type: "button", class: "reload", click: reload }, "Load it again"));
     }, () => undefined); // that nobody answers is told by what one does
   }, 2000);
   where.gone.addEventListener("abort", () => clearInterval(timer));

@@ -22,7 +22,7 @@ async function begin(): Promise<void> {
 
 function play(page: PlayPage): Play {
   return new Play(page, {
-    edit: (state) => void edit(page, state),
+    edit: (state) => void (state.shown === page.shown ? edit(page, state) : reload(page)),
     reload: () => void reload(page),
     cured: (edited, words) => play(edited.page).written(edited.edit, words),
     mend: (state, draft) => edit(page, state).refuse(draft.errors, draft.draft),
@@ -38,7 +38,7 @@ async function reload(page: PlayPage): Promise<void> {
   try {
     const now = await ask<Edited>("api/edit/reload", {});
     if ("page" in now) return void play(now.page);
-    const state = { text: now.draft, version: now.version ?? "", undo: null, redo: null, arcs: {}, marked: [] };
+    const state = { text: now.draft, version: now.version ?? "", shown: page.shown, undo: null, redo: null, arcs: {}, marked: [] };
     edit(page, state).refuse(now.errors, now.draft);
   } catch (error) {
     const words = error instanceof Refused ? error.message : "the connection is lost";

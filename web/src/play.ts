@@ -69,7 +69,7 @@ export class Play {
     this.steps = [{ what: "the initial marking", moment: "scene" in page.top ? { ...page.moment, top: page.top } : page.moment }];
     const editButton = this.button("Edit", "Edit the net file", () => void this.beginEdit());
     this.frame.tools.append(this.undoButton, this.redoButton, this.resetButton, this.gatesSwitch, editButton);
-    if (page.editable) watchFile(this.frame, this.to.reload);
+    if (page.editable) watchFile(this.frame, () => page.shown, this.to.reload);
     this.gatesSwitch.title = "Free: external gates are open, as the analysis has them. Else they are as the signals say.";
     this.frame.side.append(
       h("div", { class: "own" }, panel("May fire", this.mayFire), this.waitPanel),
@@ -154,7 +154,7 @@ export class Play {
         this.explain(name, wait?.why ?? "");
         return;
       }
-      const after = await ask<Fired>("api/fire", { ...this.at(this.now), transition: name });
+      const after = await ask<Fired>("api/fire", { ...this.at(this.now), shown: this.page.shown, transition: name });
       this.picture.reveal([name]);
       this.picture.fly([name]);
       const says = this.words.get(name);
@@ -168,7 +168,7 @@ export class Play {
     return this.doing(async () => {
       const on = !this.now.signals.includes(signal);
       const signals = on ? [...this.now.signals, signal] : this.now.signals.filter((name) => name !== signal);
-      const after = await ask<Moment>("api/moment", { ...this.at(this.now), signals, became: on ? signal : null });
+      const after = await ask<Moment>("api/moment", { ...this.at(this.now), shown: this.page.shown, signals, became: on ? signal : null });
       this.add(`${signal} becomes ${on ? 1 : 0}`, after);
       announce(`${signal} is ${on ? 1 : 0}. ${this.summary(after)}`);
     });
@@ -176,7 +176,7 @@ export class Play {
 
   private setFree(free: boolean): Promise<void> {
     return this.doing(async () => {
-      this.add(free ? "gates are free" : "gates as the signals say", await ask<Moment>("api/moment", { ...this.at(this.now), free }));
+      this.add(free ? "gates are free" : "gates as the signals say", await ask<Moment>("api/moment", { ...this.at(this.now), shown: this.page.shown, free }));
       announce(`${free ? "Gates are free." : "Gates are as the signals say."} ${this.summary(this.now)}`);
     });
   }
@@ -393,7 +393,7 @@ export class Play {
       const run = await ask<Run>("api/run", { name });
       this.playback?.stop();
       this.playback = new Playback(run, this.picture, async (at) => {
-        const moment = await ask<Moment>("api/moment", at);
+        const moment = await ask<Moment>("api/moment", { ...at, shown: this.page.shown });
         if (moment.top) this.top.show(moment.top);
         return moment;
       }, (here) => this.ended(here));

@@ -115,6 +115,8 @@ export interface PlayPage {
   mode: "play";
   file: string;
   editable: boolean;
+  /** Which of the nets that the file has held since the command began. */
+  shown: number;
   net: Net;
   moment: Moment;
   runs: RunSummary[];
@@ -139,6 +141,7 @@ export interface EditState {
   why_not?: string;
   text: string;
   version: string;
+  shown: number;
   undo: string | null;
   redo: string | null;
   arcs: Record<string, Record<Part, string[]>>;
