@@ -97,8 +97,9 @@ def init(site: str, requirement: str, folder: str) -> int:
     from firable.nets.diagnostics import Diagnostic, InputError
     from firable.nets.writing import make_folder
 
-    if "'" in requirement or "\n" in requirement:
-        raise click.UsageError("--install: a requirement has neither quotes nor line ends")
+    if not requirement.isprintable() or any(part in requirement for part in ("'", " #", ": ")):
+        # It stands between quotes of a shell, on a line of YAML.
+        raise click.UsageError("--install: a requirement has no quotes ('), line ends, ' #' or ': ' in it")
     file, template = _FILES[site]
     path = Path(folder) / file
     if path.exists():

@@ -97,7 +97,8 @@ def test_a_workflow_is_never_written_over(project: Path, capsys: pytest.CaptureF
 
 
 def test_a_requirement_cannot_leave_its_quotes(project: Path) -> None:
-    assert main(["ci", "init", "--install", "firable'; rm"]) == 2
+    for requirement in ("firable'; rm", "firable # of today", "firable @ file: x", "a\rb", "a\x85b", "a\udc85"):
+        assert main(["ci", "init", "--install", requirement]) == 2
     assert not (project / WORKFLOW).exists()
     assert main(["ci", "init", "--install", "./firable[prove]"]) == 0
     assert "pip install './firable[prove]'" in (project / WORKFLOW).read_text("utf-8")
