@@ -7,13 +7,17 @@ take the token that the part wants there, put one on the fault place that it wan
 reads, and a timer that it wants 0 is not set. Where the fault place stops a machine, the stop comes late. That is no
 mistake of the split, and what is proved holds; whoever draws the line between controllers has to know of it.
 
+Two that want tokens on two places of a controller that has one token never meet either: such a controller is a state
+machine, of which every firing takes as many tokens as it gives (a place invariant with the weights 1).
+
 Arcs are left out: two transitions of one machine that share a completion or a place hardly ever have their tokens at
 the same time, and where they do, a coordinator decides them both. Cost: linear in the arcs and gates of the net.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Collection, Iterator
 
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, Severity
@@ -24,6 +28,7 @@ def blocked_timeouts(decomposition: Decomposition) -> Iterator[Diagnostic]:
     """Warnings of coordinated transitions beside which a timeout has to wait (F4015), in the order of the table."""
     net = decomposition.net
     timers = {net.transitions[t]: net.places[p].cleared[-1] for p, t in net.fault_transitions.items()}
+    single = _with_one_token(net) if timers else frozenset()
     changing: dict[str, list[Transition]] = {}
     for timeout, timer in timers.items():
         for name in (*_changed(net, timeout), timer):
@@ -36,6 +41,8 @@ def blocked_timeouts(decomposition: Decomposition) -> Iterator[Diagnostic]:
             needs, others, timer = _needs(transition), _needs(timeout), timers[timeout]
             if any(needs.get(name, value) != value for name, value in others.items() if name != timer):
                 continue  # they never meet
+            if _at_two_places(net, transition, timeout, single):
+                continue
             common = [
                 name for name in gates if timeout in changing.get(name, ()) and (name != timer or not needs[name])
             ]
@@ -48,6 +55,26 @@ def _needs(transition: Transition) -> dict[str, bool]:
     needs = dict.fromkeys((*transition.inputs, *transition.permissive), True)
     needs |= dict.fromkeys((*transition.outputs, *transition.inhibitive), False)
     return needs | {gate.signal: gate.wanted for gate in transition.external}
+
+
+def _with_one_token(net: Net) -> frozenset[str]:
+    """The controllers whose places always have one token between them."""
+    held = Counter(place.owner for place in net.places if place.marked)
+    owners = {place.name: place.owner for place in net.places}
+    moving = set[str | None]()
+    for transition in net.transitions:
+        taken, given = (Counter(owners[name] for name in some) for some in (transition.inputs, transition.outputs))
+        moving |= {owner for owner in taken | given if taken[owner] != given[owner]}
+    return frozenset(owner for owner, count in held.items() if owner is not None and count == 1 and owner not in moving)
+
+
+def _at_two_places(net: Net, one: Transition, other: Transition, single: Collection[str]) -> bool:
+    """Whether they want the one token of a controller on different places."""
+    wanted, also = (
+        {name for name, value in _needs(of).items() if value and name in net.place_index} for of in (one, other)
+    )
+    at = {net.place(name).owner: name for name in wanted}
+    return any((owner := net.place(name).owner) in single and at.get(owner, name) != name for name in also)
 
 
 def _changed(net: Net, timeout: Transition) -> frozenset[str]:

@@ -160,6 +160,7 @@ WITH_STOP = ("a: {start: free, inputs: key, places: {", "a: {start: free, inputs
         ("if: a.go_overdue", False),
         ("unless: a.there", False),
         ("unless: a.free", False),
+        ("if: a.free, unless: a.go_overdue", False),
     ],
 )
 def test_a_timeout_that_a_promise_would_keep_from_firing_is_warned_of(gate: str, waits: bool) -> None:
@@ -177,6 +178,23 @@ def test_a_timeout_that_a_promise_would_keep_from_firing_is_warned_of(gate: str,
     warned = [*blocked_timeouts(decomposition)]
     assert [(one.code, one.subject) for one in warned] == ([("F4015", ("transitions", "lit"))] if waits else [])
     assert all(one.message.endswith(f"which reads '{gate.split()[1]}'") for one in warned)
+
+
+def test_a_timeout_of_a_controller_with_two_tokens_may_meet_what_wants_another_place_of_it() -> None:
+    text = HANDOVER.replace("{idle: , has: }", "{idle: , has: , lamp: }")
+    text = text.replace("  use:", "  lit: {from: b.idle, to: b.lamp, if: a.free, unless: a.go_overdue}\n  use:")
+    assert [*blocked_timeouts(split(parse_net(text)))] == []
+    two = text.replace(
+        "a: {start: free, inputs: key, places: {free: ,",
+        "a: {start: [free, spare], inputs: key, places: {free: , spare: ,",
+    )
+    two = two.replace("  use:", "  more: {from: a.spare, to: a.free}\n  use:")
+    assert [one.subject for one in blocked_timeouts(split(parse_net(two)))] == [("transitions", "lit")]
+    grown = text.replace("start: {from: a.free, to: a.go}", "start: {from: a.free, to: [a.go, a.spare]}")
+    grown = grown.replace("places: {free: ,", "places: {free: , spare: ,", 1).replace(
+        "  use:", "  more: {from: a.spare, to: a.free}\n  use:"
+    )
+    assert [one.subject for one in blocked_timeouts(split(parse_net(grown)))] == [("transitions", "lit")]
 
 
 def test_each_of_several_timeouts_that_wait_for_one_decision_is_named() -> None:
