@@ -102,7 +102,7 @@ def takeover(
         targets = dict(zip(journals, into, strict=True))
         written = {targets[file]: names for file, names in dealt.items() if names}
         goes_on = {file: targets[file] if dealt[file] else None for file in journals}
-        marks = {str(mark_of(file)): mark_text(after.net.name, target) for file, target in goes_on.items()}
+        marks = {str(mark_of(file)): mark_text(after.net.name, target, written) for file, target in goes_on.items()}
         cells = {}
         if len(journals) == 1 and Path(f"{journals[0]}.cell").is_file():  # the simulated cell, if there is one
             cells = {f"{into[0]}.cell": Path(f"{journals[0]}.cell").read_bytes()}
@@ -138,6 +138,7 @@ def _removed_if_it_fails(names: Collection[str], marks: Collection[str]) -> Iter
 
     The marks go last, and only where nothing else is left by which the new bundle might be run.
     """
+    from firable.nets.diagnostics import InputError
     from firable.nets.writing import stands
 
     new, marked = ([name for name in some if not stands(name)] for some in (names, marks))
@@ -145,8 +146,10 @@ def _removed_if_it_fails(names: Collection[str], marks: Collection[str]) -> Iter
         yield
     except BaseException:
         _take_away(new)
-        if not any(map(stands, new)):
-            _take_away(marked)
+        with suppress(InputError):  # where it is not known to be gone, the old one stays marked
+            _sync_folders(new)
+            if not any(map(stands, new)):
+                _take_away(marked)
         raise
 
 
@@ -158,13 +161,25 @@ def _take_away(names: Iterable[str]) -> None:
 
 def _put_down(files: Mapping[str, bytes | str]) -> None:
     """Write files whole, and durably before anything that is written behind them."""
-    from firable.executor.journal.sqlite_journal import sync_folder
     from firable.nets.writing import write_whole
 
     for file, data in files.items():
         write_whole(file, data)
-    for folder in {Path(file).parent for file in files}:
-        sync_folder(folder)
+    _sync_folders(files)
+
+
+def _sync_folders(files: Iterable[str]) -> None:
+    """Make durable which files stand in the folders of these; raises `InputError` F1017 where that fails."""
+    from firable.executor.journal.sqlite_journal import sync_folder
+    from firable.nets.diagnostics import Diagnostic, InputError
+    from firable.nets.source import printable
+
+    for folder in dict.fromkeys(Path(os.path.realpath(file)).parent for file in files):
+        try:
+            sync_folder(folder)
+        except OSError as error:
+            message = f"{printable(str(folder))}: what is written there may not outlive a power cut: {error.strerror}"
+            raise InputError([Diagnostic("F1017", message, "name files in a folder on another disk")]) from None
 
 
 def _refuse_copies(machines: Mapping[str, Sequence[str]], memories: Mapping[str, Memory]) -> None:

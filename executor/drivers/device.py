@@ -92,6 +92,11 @@ class Options(BaseModel):
 
     model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
 
+    @property
+    def polled_s(self) -> float:
+        """How long it may take until a change at the device is shown, because it is asked for it; 0 where it tells."""
+        return 0.0
+
     def far_end(self) -> object:
         """What is equal of two devices that are one, however each is spoken with; by default all options."""
         return self

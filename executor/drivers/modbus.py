@@ -45,6 +45,11 @@ class TcpOptions(Options):
     unit: int = Field(default=1, ge=0, le=255)
     every_s: float = Field(default=0.01, ge=0, le=60, allow_inf_nan=False)
 
+    @property
+    def polled_s(self) -> float:
+        """The time from one poll to the next."""
+        return self.every_s
+
     def far_end(self) -> object:
         """A unit behind an address."""
         return one_name(self.host), self.port, self.unit

@@ -115,6 +115,11 @@ class OpcUaOptions(Options):
             refuse(f"'{twice[0]}' has two indexes", "give each namespace one")
         return namespaces
 
+    @property
+    def polled_s(self) -> float:
+        """The time from one look of the server to the next."""
+        return self.every_s
+
     def point_problem(self, point: Point) -> str:
         """An index that means nothing."""
         found = _NODE.fullmatch(point)

@@ -4,13 +4,13 @@ The hosts of one run know of each other by their link, and share no device (`sha
 binding is none of these hosts: it was started twice, or an old computer was switched on again with the script of last
 year. Both would command the machines, each would stop those of the other at its start and its end, and the watchdog of
 the device would be content with the heartbeat of either. So before a run begins, before its journal is opened and
-anything is written, it listens for the time of four beats. A heartbeat that changes twice while nobody here sends it is
-another program's, and the run does not begin (F5106). One change may be the last beat of a process that was killed,
-still on its way.
+anything is written, it listens for the time of four beats, or of four polls where these take longer. A heartbeat that
+changes twice while nobody here sends it is another program's, and the run does not begin (F5106). One change may be the
+last beat of a process that was killed, still on its way.
 
-What cannot be heard says nothing: a heartbeat that the device does not show, and whatever goes wrong with a connection
-here, which goes wrong once more in the run and is dealt with there. A line has one program at a time. Two runs that are
-started in the same second do not hear each other.
+What cannot be heard says nothing: a heartbeat that the device does not show or that comes too seldom, and whatever goes
+wrong with a connection here, which goes wrong once more in the run and is dealt with there. A line has one program at a
+time. Two runs that are started in the same second do not hear each other.
 
 Rejected: to listen when the run has begun. What fires by then is commanded later, all devices wait for the slowest of
 them, and an emergency stop with them. Rejected: to look at the heartbeat as long as the run lasts. Of two that notice
@@ -20,6 +20,7 @@ each other both would stop, and the one that was there first is the one that sho
 from __future__ import annotations
 
 import asyncio
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from typing import Final
 
@@ -30,8 +31,27 @@ from firable.nets.diagnostics import Diagnostic, InputError
 
 BEATS: Final = 4
 """So many beats of a heartbeat are waited for its two changes."""
-SECONDS_MIN, SECONDS_MAX = 1.0, 10.0
-"""But at least so long, for who beats may be busy, and at most so long, for somebody waits for the start."""
+SECONDS_MIN, SECONDS_MAX = 1.0, 4.0
+"""But at least so long, for who beats may be busy, and at most so long, for machines that were left on are to stop."""
+
+
+class _LeftBehind(ThreadPoolExecutor):
+    """Threads that nobody waits for: a name server may not answer."""
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Begin nothing more."""
+        del wait, cancel_futures
+        super().shutdown(wait=False, cancel_futures=True)
+
+
+def listen_first(binding: Binding) -> None:
+    """Raise `InputError` F5106 where another program sends the heartbeat of a device, on an event loop of its own."""
+
+    async def listen() -> None:
+        asyncio.get_running_loop().set_default_executor(_LeftBehind())
+        await demand_alone(binding)
+
+    asyncio.run(listen())
 
 
 def shows(kind: DeviceKind) -> bool:
@@ -50,11 +70,11 @@ async def demand_alone(binding: Binding) -> None:
         raise InputError(problems)
 
 
-async def _hears(connection: Connection, point: Point, every_s: float) -> bool:
+async def _hears(connection: Connection, point: Point, beats_s: float) -> bool:
     """Whether a point that nobody here writes changes twice in the time of some beats, from number to number."""
     changes, before = 0, None
     with suppress(TimeoutError):
-        async with asyncio.timeout(min(max(BEATS * every_s, SECONDS_MIN), SECONDS_MAX)):
+        async with asyncio.timeout(min(max(beats_s, SECONDS_MIN), SECONDS_MAX)):
             while changes < 2:
                 for at, value in await connection.read():
                     if at == point and (beat := _beat(value)) is not None:
@@ -70,21 +90,21 @@ def _beat(value: Value) -> int | None:
 
 async def _rival(binding: Binding, name: str) -> Diagnostic | None:
     """That another program sends the heartbeat of a device, if one does."""
-    device, kind = binding.document.devices[name], binding.kinds[name]
-    heartbeat = device.heartbeat
-    if heartbeat is None or not shows(kind) or kind.point_problem(heartbeat.write, Use.READ):
+    device, kind, options = binding.document.devices[name], binding.kinds[name], binding.options[name]
+    heartbeat, is_heard = device.heartbeat, False
+    if heartbeat is None or not shows(kind):
         return None
-    try:
+    with suppress(Exception):  # what goes wrong the run meets again, and stops its machines in order
+        if kind.point_problem(heartbeat.write, Use.READ):
+            return None
         async with asyncio.timeout(2 * device.timeout_s):
-            connection = await kind.connect(binding.options[name], Wanted((heartbeat.write,), device.timeout_s))
+            connection = await kind.connect(options, Wanted((heartbeat.write,), device.timeout_s))
         try:
-            is_heard = await _hears(connection, heartbeat.write, heartbeat.every_s)
+            is_heard = await _hears(connection, heartbeat.write, BEATS * max(heartbeat.every_s, options.polled_s))
         finally:
             await connection.close()
-    except Exception:  # the run meets it again, and stops its machines in order
-        return None
     if not is_heard:
         return None
     message = f"another program sends the heartbeat of '{name}', at '{heartbeat.write}', and commands its machines"
-    hint = "this run has not begun, and has written nothing: end that program first, or name the device that is meant"
+    hint = "this run has not begun, and has written nothing: find out which of the two is the one that should run"
     return binding.problem("F5106", ("devices", name, "heartbeat", "write"), message, hint)

@@ -73,8 +73,10 @@ class SqliteJournal:
         self.failed: InputError | None = None
         self.witness_descriptor = -1
         with _failures(self.path, "opened"):
-            _refuse_taken_over(self.path)
+            refuse_taken_over(self.path)
             is_new = not self.path.exists() or not self.path.stat().st_size
+            if is_new and self._durable():  # and nothing is made there
+                _damaged(self.path, self._gone, is_alone=True)
             # One thread at a time uses it, and not always the same.
             self.connection = sqlite3.connect(self.path, timeout=0, isolation_level=None, check_same_thread=False)
         try:
@@ -154,7 +156,7 @@ class SqliteJournal:
         run("pragma journal_mode = wal")
         run("pragma synchronous = full")
         run("begin exclusive")
-        _refuse_taken_over(self.path)  # it may have been while this waited
+        refuse_taken_over(self.path)  # it may have been while this waited
         tables = {name for (name,) in run("select name from sqlite_master where type = 'table'")}
         if not tables and self._durable() == "":  # it was being made, if not now
             for statement in filter(str.strip, _SCHEMA.split(";")):
@@ -180,8 +182,7 @@ class SqliteJournal:
         if problems:
             _damaged(self.path, problems[0])
         if not run("select count(*) from sqlite_master").fetchone()[0]:
-            told = f"it is gone or empty, and {printable(self.witness.name)} beside it tells of one"
-            _damaged(self.path, told if self.witness.exists() else _NOTHING, is_alone=True)
+            _damaged(self.path, self._gone if self.witness.exists() else _NOTHING, is_alone=True)
         headers = run("select format, digest, machines, generation, total from header").fetchall()
         if len(headers) != 1 or not isinstance(headers[0][3], int):
             _damaged(self.path, "its header is missing")
@@ -207,6 +208,10 @@ class SqliteJournal:
             _damaged(
                 self.path, f"it has lost what was stored: it is at sync {self.generation}, and {int(durable)} were done"
             )
+
+    @property
+    def _gone(self) -> str:
+        return f"it is gone or empty, and {printable(self.witness.name)} beside it tells of one"
 
     def _durable(self) -> str | None:
         """What the witness says, if it is there."""
@@ -242,9 +247,10 @@ def mark_of(path: Path | str) -> Path:
     return Path(f"{os.path.realpath(path)}.taken-over")
 
 
-def mark_text(net: str, journal: Path | str | None) -> str:
-    """What such a file says: which net goes on, and in which journal; in none where it has none of the machines."""
-    return json.dumps({"net": net, "journal": None if journal is None else os.path.realpath(journal)}) + "\n"
+def mark_text(net: str, journal: Path | str | None, journals: Iterable[Path | str]) -> str:
+    """What it says: which net goes on, in which journal (None: without these machines), and in which in all."""
+    said = None if journal is None else os.path.realpath(journal)
+    return json.dumps({"net": net, "journal": said, "journals": [os.path.realpath(one) for one in journals]}) + "\n"
 
 
 def machines_of(path: Path | str) -> tuple[str, ...]:
@@ -263,21 +269,26 @@ def machines_of(path: Path | str) -> tuple[str, ...]:
     return tuple(map(str, names))
 
 
-def _refuse_taken_over(path: Path) -> None:
-    mark = mark_of(path)
-    if not mark.exists():
-        return
+def refuse_taken_over(path: Path | str) -> None:
+    """Raise `InputError` F5036 where a new bundle goes on from a journal; F5034 where that cannot be read."""
+    with _failures(Path(path), "opened"):
+        mark = mark_of(path)
+        if not mark.exists():
+            return
+        text = mark.read_text("utf-8", "replace")
     try:
-        said = json.loads(mark.read_text("utf-8", "replace"))
-        net, journal = str(said["net"]), said["journal"]
+        said = json.loads(text)
+        net, journal, journals = str(said["net"]), said["journal"], [str(one) for one in said["journals"]]
     except (ValueError, TypeError, KeyError):  # whatever stands there, somebody has put it there
-        net, journal = "another bundle", None
+        net, journal, journals = "another bundle", None, [""]
     where = "" if journal is None else f" in {printable(_from_here(str(journal)))}"
     message = f"{printable(str(path))}: the journal was taken over: '{printable(net)}' goes on{where}"
     hint = "run that one; both would command the same machines"
-    if journal is None or not Path(str(journal)).exists():
-        mark_shown = printable(_from_here(str(mark)))
-        hint = f"run it where its journal was brought; only where there is none, remove {mark_shown}, and run this one"
+    if not all(Path(one).is_file() and Path(one).stat().st_size for one in journals):
+        hint = (
+            "run it where its journals were brought; where the takeover was broken off, and not all of them were ever "
+            f"there, take away those that are, {printable(_from_here(str(mark)))} and each other .taken-over of it"
+        )
     raise InputError([Diagnostic("F5036", message, hint)])
 
 

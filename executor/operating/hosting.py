@@ -7,7 +7,6 @@ signed it; at connection the hosts compare what they hold.
 
 from __future__ import annotations
 
-import asyncio
 import ssl
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -16,7 +15,8 @@ from typing import Final
 
 from firable.executor.drivers.bound import BoundDriver
 from firable.executor.drivers.driver import Driver, Latched
-from firable.executor.drivers.rivals import demand_alone
+from firable.executor.drivers.rivals import listen_first
+from firable.executor.journal.sqlite_journal import refuse_taken_over
 from firable.executor.links.link import Greeting, Link
 from firable.executor.operating.conduct import UNATTENDED, Conduct, Watch
 from firable.executor.operating.host import Host
@@ -190,8 +190,10 @@ def run_host(
     stop until that is reset. Raises `InputError` as link, journal and trace do, F5003 where the plant does not fit, and
     F5106 where another program commands a device, before anything is written.
     """
+    if conduct.journal_path is not None:
+        refuse_taken_over(conduct.journal_path)
     if isinstance(driver, BoundDriver):
-        asyncio.run(demand_alone(driver.binding))
+        listen_first(driver.binding)
     controllers = [subnet.name for subnet in bundle.decomposition.subnets if subnet.name in machines]
     monitor = None
     if plant is not None and conduct.watch is not Watch.IGNORE:

@@ -9,7 +9,6 @@ The simulated cell runs in virtual time unless a speed is given; then a run is a
 
 from __future__ import annotations
 
-import asyncio
 from collections import Counter
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,8 +19,9 @@ from firable.executor.cell.disturbances import Disturbance
 from firable.executor.cell.plant import Plant
 from firable.executor.drivers.binding import Binding
 from firable.executor.drivers.bound import bound_driver
-from firable.executor.drivers.rivals import demand_alone
+from firable.executor.drivers.rivals import listen_first
 from firable.executor.drivers.simulated import SimulatedDriver
+from firable.executor.journal.sqlite_journal import refuse_taken_over
 from firable.executor.operating.conduct import UNATTENDED, Conduct, Told, Watch
 from firable.executor.operating.host import Host
 from firable.executor.operating.log import Log
@@ -279,7 +279,9 @@ def run_bound(
     if problems := (*unproved(bundle), *(misfits(plant, bundle.net) if plant is not None else ())):
         raise InputError(problems)
     driver = bound_driver(binding, bundle.net)
-    asyncio.run(demand_alone(driver.binding))
+    if conduct.journal_path is not None:
+        refuse_taken_over(conduct.journal_path)
+    listen_first(driver.binding)
     decomposition = bundle.decomposition
     with opened(decomposition, bundle.digest, conduct.journal_path, conduct.trace) as files:
         figures = figures_for(decomposition.net, conduct.service)

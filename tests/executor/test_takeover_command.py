@@ -89,7 +89,12 @@ def test_a_journal_that_was_taken_over_is_known_by_every_name(
     with pytest.raises(InputError, match=f"'cell' goes on in {tmp_path}/new.journal"):
         SqliteJournal(before, digest, machines)
     (tmp_path / "new.journal").unlink()
-    with pytest.raises(InputError, match=f"run it where its journal was brought; .* remove {before}.taken-over"):
+    with pytest.raises(
+        InputError, match=r"F5032.*it is gone or empty, and new\.journal\.generation beside it tells of"
+    ):
+        SqliteJournal(tmp_path / "new.journal", read_bundle(bundles[1]).digest, machines)
+    assert not (tmp_path / "new.journal").exists(), "to try it makes none"
+    with pytest.raises(InputError, match=f"where its journals were brought; .* take away .* {before}.taken-over"):
         SqliteJournal(before, digest, machines)
     Path(f"{before}.taken-over").write_text("by hand")
     with pytest.raises(InputError, match="'another bundle' goes on"):

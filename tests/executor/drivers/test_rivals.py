@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Sequence
 from pathlib import Path
+from threading import Event
 
 import pytest
 from support.takeovers import OLD, bundle
@@ -11,8 +12,9 @@ from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.binding import Binding, parse_binding
 from firable.executor.drivers.bound import bound_driver
 from firable.executor.drivers.device import Connection, LinkError, Point, Value, Wanted, Writes
-from firable.executor.drivers.mqtt import Mqtt
-from firable.executor.drivers.rivals import SECONDS_MAX, SECONDS_MIN, demand_alone
+from firable.executor.drivers.mqtt import Mqtt, MqttOptions
+from firable.executor.drivers.rivals import SECONDS_MAX, SECONDS_MIN, demand_alone, listen_first
+from firable.executor.journal.sqlite_journal import mark_of, mark_text
 from firable.executor.links.in_process import Exchange, InProcessLink
 from firable.executor.links.link import Greeting
 from firable.executor.operating.conduct import Conduct
@@ -109,6 +111,35 @@ def test_it_is_listened_for_four_beats_but_not_for_ever(
     assert listened(monkeypatch, Shows([]), every_s) == pytest.approx(seconds)
 
 
+def test_a_device_that_is_polled_more_seldom_than_it_beats_is_listened_to_for_four_polls(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(MqttOptions, "polled_s", 0.75)
+    assert listened(monkeypatch, Shows([])) == pytest.approx(3.0)
+
+
+def test_what_was_heard_is_heard_though_the_connection_is_not_closed_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Bad(Shows):
+        async def close(self) -> None:
+            raise OSError("reset")
+
+    with pytest.raises(InputError, match="F5106"):
+        listened(monkeypatch, Bad([[7], [8], [9]]))
+
+
+def test_a_name_server_that_does_not_answer_holds_up_nothing_for_longer(monkeypatch: pytest.MonkeyPatch) -> None:
+    answered, asked = Event(), list[bool]()
+
+    async def connect(_self: object, _options: object, _wanted: Wanted) -> Connection:
+        await asyncio.to_thread(lambda: asked.append(answered.wait(20)))
+        raise LinkError("no such name")
+
+    monkeypatch.setattr(Mqtt, "connect", connect)
+    listen_first(parse_binding(BINDING.replace("EVERY", "0.1").replace("timeout_s: 1", "timeout_s: 0.05")))
+    assert asked == [], "it is still waited for by its thread"
+    answered.set()
+
+
 @pytest.mark.parametrize("error", [LinkError("cut"), OSError("no route"), KeyError("a mistake of the library")])
 def test_what_goes_wrong_says_nothing_and_is_met_again_in_the_run(
     error: Exception, monkeypatch: pytest.MonkeyPatch
@@ -135,15 +166,20 @@ def test_a_run_that_is_not_alone_leaves_no_journal_and_no_trace(
     here = ("robot",)
     driver = bound_driver(binding, read.net, own_net(read.decomposition, here))
 
-    async def not_alone(bound: Binding) -> None:
+    def not_alone(bound: Binding) -> None:
         assert set(bound.document.devices) == {"plc"}
         raise InputError([Diagnostic("F5106", "another program sends the heartbeat", "")])
 
     for module in ("running", "hosting"):
-        monkeypatch.setattr(f"firable.executor.operating.{module}.demand_alone", not_alone)
+        monkeypatch.setattr(f"firable.executor.operating.{module}.listen_first", not_alone)
     link = InProcessLink(Exchange(), Greeting(read.digest, here))
-    for run in (lambda: run_bound(read, binding, conduct), lambda: run_host(read, here, driver, link, conduct)):
+    runs = (lambda: run_bound(read, binding, conduct), lambda: run_host(read, here, driver, link, conduct))
+    for run in runs:
         with pytest.raises(InputError, match="F5106"):
             run()
     assert not list(tmp_path.glob("journal*"))
     assert not (tmp_path / "trace").exists()
+    mark_of(tmp_path / "journal").write_text(mark_text("cell", tmp_path / "new", ()))
+    for run in runs:  # whoever beats there is the one that goes on
+        with pytest.raises(InputError, match="F5036"):
+            run()
