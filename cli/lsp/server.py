@@ -75,10 +75,11 @@ _Told = tuple[lsp.Diagnostic, tuple[Cure, ...]]
 
 @dataclass
 class _Opened:
-    """A file in the editor: its last text that was a net, the names of the last one that was YAML, and what cures the
-    verdicts on the text that was checked.
+    """A file in the editor: its text as it was read last, the last one that was a net, the names of the last one that
+    was YAML, and what cures the verdicts on the text that was checked.
     """
 
+    text: str | None = None
     net: Net | None = None
     names: Names | None = None
     checked: str = ""
@@ -145,6 +146,7 @@ class NetServer(LanguageServer):
         """Read a file as it stands; what refuses it, or nothing, and then it is the net that is hovered over."""
         opened = self.opened.setdefault(uri, _Opened())
         source = self.source(uri)
+        opened.text = source.text
         opened.names = self.names(uri) or opened.names
         try:
             opened.net = parse_positioned(source.text, source.file)[0]
@@ -279,11 +281,15 @@ async def did_save(params: lsp.DidSaveTextDocumentParams) -> None:
 async def did_change(params: lsp.DidChangeTextDocumentParams) -> None:
     """Read a file that is being changed; verdicts are of the text as it was saved, and told anew then.
 
-    Of changes that come faster than a large file is read, the last is.
+    Of changes that come faster than a large file is read, the last is; and none that was read meanwhile, for it was
+    saved, and its verdicts may stand there.
     """
     uri = params.text_document.uri
     await asyncio.sleep(CHANGE_SECONDS)
-    if server.workspace.get_text_document(uri).version == params.text_document.version:
+    if server.workspace.get_text_document(uri).version != params.text_document.version:
+        return
+    opened = server.opened.get(uri)
+    if opened is None or opened.text != server.source(uri).text:
         server.publish(uri, server.read(uri))
 
 

@@ -3,7 +3,7 @@
 import asyncio
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
-from contextlib import AsyncExitStack, asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -247,6 +247,23 @@ def test_a_long_file_is_renamed_in_and_its_names_are_listed_at_once(tmp_path: Pa
         assert edit is not None
         assert edit.changes is not None
         assert sorted(each.new_text.strip() for each in edit.changes[one.uri]) == ["- seven", "- seven", "seven:"]
+
+    within(tmp_path / "cell.firable.yaml", act)
+
+
+def test_what_checking_says_is_not_taken_back_by_the_change_before_the_save(tmp_path: Path, within: Within) -> None:
+    small = "firable: 1\ncell: c\nplaces:\n  a: {}\n  b: {}\nstart: a\ntransitions:\n  t: {from: a, to: b}\n"
+
+    async def act(one: Editor) -> None:
+        one.open(small)
+        await one.told(bool)
+        one.change(f"{small}# saved at once, as editors do that save by themselves\n")
+        one.save()
+        last = list[lsp.Diagnostic]()
+        with suppress(TimeoutError):
+            while True:
+                last = list((await asyncio.wait_for(one.published.get(), 1)).diagnostics)
+        assert last
 
     within(tmp_path / "cell.firable.yaml", act)
 
