@@ -228,7 +228,9 @@ class Names:
         return self.source.with_parts(
             (*place, use.length, names[use.word])
             for use in self._used_in_full()
-            if use.word in names and Kind.PLACE in use.kinds and (place := self._inside(use.scalar, use.at, use.length))
+            if use.word in names
+            and not {*_NODES}.isdisjoint(use.kinds)
+            and (place := self._inside(use.scalar, use.at, use.length))
         )
 
     def with_full_roles(self, name: str) -> str:

@@ -144,8 +144,12 @@ def own(source: Source, kind: Kind, name: str, owner: str | None) -> Source:
     for of, fault in _limits(source, scope):
         if local in {of, fault}:
             raise _leads_there(of, fault, "both are of one controller: move both in the text of the file")
-    renamed = _moved_names(YamlText(source), scope, local, owner)
-    source = Source(source.file, Names(source).with_full_roles(name))
+    renamed, names = _moved_names(YamlText(source), scope, local, owner), Names(source)
+    places = {one.name for one in names.occurrences if one.kind is Kind.PLACE} | names.given.keys()
+    if twice := sorted((places - renamed.keys()).intersection(renamed.values())):
+        hint = "give one of them another name first; a time limit may give it"
+        raise InputError([Diagnostic("F2001", f"there is a '{twice[0]}' already", hint)])
+    source = Source(source.file, names.with_full_roles(name))
     text = YamlText(Source(source.file, Names(source).replaced(renamed)))
     marked = local in names_in(text.at((*scope, "start")))
     raw = text.raw((*scope, "places", local))

@@ -378,6 +378,24 @@ def test_no_edit_makes_a_time_limit_lead_to_another_place(limit: str, fault: str
             edited(text, edit)
 
 
+@pytest.mark.parametrize(("place", "fault"), [("robot.busy", "mc.busy_fault"), ("mc.busy_fault", "robot.busy_fault")])
+def test_no_edit_brings_a_place_where_a_time_limit_leads_to_another_of_its_name(place: str, fault: str) -> None:
+    text = LIMITED.replace("      busy_fault: {description: late}\n", "").replace(
+        "  mc:\n", "  mc:\n    places: {busy_fault: }\n"
+    )
+    assert len(parse_net(text).places) == 4
+    with pytest.raises(InputError, match=f"there is a '{fault}' already"):
+        edited(text, lambda s: edits.own(s, Kind.PLACE, place, fault.partition(".")[0]))
+
+
+def test_an_arbiter_decides_on_the_fault_transition_of_a_place_that_has_moved() -> None:
+    text = LIMITED.replace("      busy_fault: {description: late}\n", "").replace(
+        "transitions:\n", "arbiters:\n  when: {among: [back, robot.busy_timeout], by: priority}\ntransitions:\n"
+    )
+    net = parse_net(edited(text, lambda s: edits.own(s, Kind.PLACE, "robot.busy", "mc")))
+    assert net.arbiters[0].among == ("back", "mc.busy_timeout")
+
+
 @pytest.mark.parametrize(
     ("edit", "code"),
     [
