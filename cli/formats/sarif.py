@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -163,8 +162,8 @@ def _artifact(file: str) -> Mapping[str, str]:
             path = path.resolve().relative_to(Path.cwd().resolve())
         except ValueError:
             return {"uri": path.as_uri()}
-    return {"uri": quote(os.fsencode(path.as_posix())), "uriBaseId": _ROOT}
+    return {"uri": quote(path.as_posix(), errors="surrogateescape"), "uriBaseId": _ROOT}
 
 
 def _fingerprint(*parts: str) -> str:
-    return hashlib.sha256(os.fsencode("\0".join(parts))).hexdigest()
+    return hashlib.sha256("\0".join(parts).encode(errors="surrogatepass")).hexdigest()

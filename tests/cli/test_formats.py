@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -99,6 +101,19 @@ def test_the_name_of_a_file_may_hold_bytes_that_are_no_text(here: Path, capsys: 
     assert "bad\N{REPLACEMENT CHARACTER}.firable.yaml:1:11" in names
     printed(capsys, "--report", "page.html", late, code=1)
     assert "late?.firable.yaml" in Path("page.html").read_text("utf-8")
+
+
+def test_a_name_that_the_encoding_of_the_system_lacks_has_the_same_fingerprint(here: Path) -> None:
+    Path("c.firable.yaml").write_text(
+        "firable: 1\ncell: türen\nplaces: {a: , b: }\nstart: a\ntransitions: {t: {from: a, to: b}}\n", "utf-8"
+    )
+    told = []
+    for utf8 in "10":
+        env = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": utf8, "PYTHONCOERCECLOCALE": "0"}
+        command = [sys.executable, "-m", "firable.cli", "check", "c.firable.yaml", "--write", "sarif", f"{utf8}.sarif"]
+        subprocess.run(command, capture_output=True, env=env, check=False)
+        told.append([one["partialFingerprints"] for one in results((here / f"{utf8}.sarif").read_text("utf-8"))])
+    assert told[0] == told[1] != []
 
 
 def test_the_schema_refuses_what_is_no_sarif(schema: Any) -> None:
