@@ -290,6 +290,27 @@ def test_a_file_with_line_ends_of_windows_is_edited_and_keeps_them(
 
 
 @needs_browser
+def test_nothing_is_typed_into_a_text_whose_place_another_takes(
+    chromium: Browser, served: tuple[str, Path], file: Path
+) -> None:
+    with page_at(chromium, served[0]) as page:
+        begin(page)
+        answers: list[Route] = []
+        page.route("**/api/edit", lambda route: answers.append(route))
+        page.get_by_label("Chosen").select_option("transition:back")
+        page.get_by_role("button", name="Delete back").click()
+        text = page.get_by_label("Text of the net file")
+        expect(text).not_to_be_editable()
+        page.wait_for_timeout(50)  # it lets the browser tell of its request
+        answers[0].continue_()
+        done(page, "back deleted")
+        expect(text).to_be_editable()
+        text.press("Control+End")
+        page.keyboard.type("# more")
+        expect(text).to_have_value(file.read_text() + "# more")
+
+
+@needs_browser
 def test_what_is_typed_while_a_text_is_written_is_not_lost(
     chromium: Browser, served: tuple[str, Path], file: Path
 ) -> None:

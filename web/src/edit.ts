@@ -97,6 +97,7 @@ export class Edit {
       }
       this.frame.banner.replaceChildren();
       this.asking = true;
+      this.pane.hold(sent === null);
       try {
         const answer = await ask<Edited>(path, { version: this.state.version, ...body, then: undefined });
         if ("page" in answer) this.takeOver(answer, then, sent);
@@ -108,6 +109,7 @@ export class Edit {
         this.fail(error);
       } finally {
         this.asking = false;
+        this.pane.hold(false);
       }
     });
     return this.queue;

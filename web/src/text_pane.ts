@@ -40,6 +40,11 @@ export class TextPane {
     return this.area.value !== this.saved;
   }
 
+  /** Whether nothing can be typed, for an edit is on its way whose text takes the place of the one here. */
+  hold(held: boolean): void {
+    this.area.readOnly = held;
+  }
+
   /** The file has another text now; its first line that is new is shown. What was typed since `sent` is kept. */
   take(text: string, sent: string | null): void {
     const before = this.saved.split("\n");
