@@ -120,6 +120,7 @@ class BoundDevice:
             self.document.timeout_s,
             urgent=frozenset(one.read for one in contacts.values()),
             forced=frozenset(one.read for one in signals.values() if one.force) - set(self._commanding()),
+            asks=frozenset(channel.asks for channel in self.document.channels.values()),
         )
         self.kept = Kept(self.document, binding.kinds[name], binding.options[name], wanted, self)
 

@@ -141,13 +141,15 @@ class Wanted:
     """What a connection is for: the points to be read, and how long an answer may take.
 
     Those that are `urgent`, the contacts of the emergency stop, are told as soon as they are known. The `forced` ones
-    are written only when a signal is forced, in the place of the device, which writes them else.
+    are written only when a signal is forced, in the place of the device, which writes them else. By those that `asks`
+    names it is asked for commands.
     """
 
     read: Collection[Point]
     timeout_s: float
     urgent: Collection[Point] = ()
     forced: Collection[Point] = ()
+    asks: Collection[Point] = ()
 
 
 class Connection(Protocol):

@@ -62,6 +62,7 @@ class SimulatedConnection:
     def __init__(self, options: SimulatedOptions, wanted: Wanted) -> None:
         self.options = options
         self.wanted = frozenset(wanted.read)
+        self.channels = frozenset(wanted.asks)
         self.draw = random.Random(options.seed)
         self.told: asyncio.Queue[tuple[Point, Value]] = asyncio.Queue()
         self.is_first = True
@@ -87,7 +88,7 @@ class SimulatedConnection:
         changed = {sensor: 0 for effect in self.options.effects.values() for sensor in effect.then}
         sensors = {**changed, **self.options.shows}
         nothing: dict[str, Value] = {"taken": "", "done": 0, "failed": 0}
-        answers = {point: nothing[what] for point in self.wanted if (what := point.rpartition(".")[2]) in nothing}
+        answers = {f"{channel}.{what}": value for channel in self.channels for what, value in nothing.items()}
         return [(point, value) for point, value in (answers | sensors).items() if point in self.wanted]
 
     async def write(self, writes: Writes) -> None:

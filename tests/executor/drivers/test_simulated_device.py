@@ -129,3 +129,19 @@ def test_what_no_command_has_changed_yet_is_shown_from_the_start() -> None:
         await asyncio.wait([task])
 
     asyncio.run(main())
+
+
+def test_a_point_that_no_channel_of_a_simulated_device_has_is_told() -> None:
+    async def main() -> None:
+        text = BINDING.replace("failed: M.failed", "failed: N.failed").replace(
+            "    jitter", "    start_s: 0.05\n    jitter"
+        )
+        heard, mixed = Heard(), driver(text)
+        await MemoryEnd("mixed").start(lambda _point, _value: None)
+        task = asyncio.create_task(mixed.run(heard, heard))
+        await until(lambda: mixed.devices["twin"].is_overdue, "the time to show all")
+        assert mixed.devices["twin"].unshown == "twin has never shown what 'M' has failed (at N.failed)"
+        task.cancel()
+        await asyncio.wait([task])
+
+    asyncio.run(main())
