@@ -194,7 +194,10 @@ class Names:
         ]
         if one.kind is Kind.PLACE and one.name in self.given:
             parts += self._leading_to(self.given[one.name].within, short)
-        return self.source.with_parts(parts)
+        text = self.source.with_parts(parts)
+        if one.kind is Kind.PLACE:
+            self.demand_roles(text, changed)
+        return text
 
     def _with_controller(self, old: str, new: str) -> str:
         """The text with another name of a controller, also in the full names of its parts, those to be among them."""
@@ -245,6 +248,27 @@ class Names:
             for use in self._roles(body, prefix)
             if use.prefix and name in {prefix + local, prefix + use.word} and (place := self._inside(use.scalar, 0, 1))
         )
+
+    @cached_property
+    def filled(self) -> frozenset[tuple[str, str]]:
+        """The places that have tasks, each with those that fill the roles, by their full names."""
+        return frozenset(
+            (prefix + local, use.prefix + use.word)
+            for _, prefix, scope in self._scopes()
+            for local, _, body in entries_of(scope, "places")
+            for use in self._roles(body, prefix)
+        )
+
+    def demand_roles(self, text: str, changed: Mapping[str, str]) -> None:
+        """Raise `InputError` F2001 where, in a text with other names, another place fills the role of a task.
+
+        A short name means the place of the same controller before that of nobody, which has no longer name.
+        """
+        wanted = {(changed.get(place, place), changed.get(role, role)) for place, role in self.filled}
+        if wanted and (lost := wanted - Names(Source(self.source.file, text)).filled):
+            place, role = min(lost)
+            message = f"another place would fill the role that '{role}' has in the task of '{place}'"
+            raise InputError([Diagnostic("F2001", message, "its short name would be that of both: choose another one")])
 
     def _scopes(self) -> Iterator[tuple[str, str, Node]]:
         """The controllers and the top level: name, the prefix of what is declared there, and where."""

@@ -158,6 +158,7 @@ def own(source: Source, kind: Kind, name: str, owner: str | None) -> Source:
     text = text.with_entry((*to, "places"), local, raw).without_entry((*scope, "places", local))
     if marked:
         text = text.with_item(to, "start", local, _before("start", SCOPE_KEYS))
+    names.demand_roles(text.source.text, renamed)
     return text.source
 
 

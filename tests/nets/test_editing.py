@@ -340,6 +340,39 @@ def test_what_fills_the_role_of_a_task_is_the_same_place_after_it_was_moved(
     assert told == {"load": loading, "leave": leaving}
 
 
+NAMESAKES = """\
+firable: 1
+cell: demo
+controllers:
+  one:
+    places:
+      own: {opens: {to: r.free, machine: R}}
+  two:
+    places:
+      load: {task: {name: load, robot: all}}
+      other: {opens: {to: s.free, machine: S}}
+  three:
+    places: {all: {opens: {to: t.free, machine: T}}}
+places:
+  all: {opens: {to: q.free, machine: Q}}
+transitions: {}
+"""
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda s: edits.rename(s, Kind.PLACE, "two.other", "all"),
+        lambda s: edits.own(s, Kind.PLACE, "two.load", "three"),
+        lambda s: edits.own(s, Kind.PLACE, "three.all", "two"),
+        lambda s: edits.rename(s, Kind.PLACE, "all", "other"),
+    ],
+)
+def test_no_edit_lets_another_place_fill_the_role_of_a_task(edit: Callable[[Source], Source]) -> None:
+    with pytest.raises(InputError, match="another place would fill the role that"):
+        edited(NAMESAKES, edit)
+
+
 def test_a_place_of_nobody_that_holds_a_token_goes_to_a_controller_with_it() -> None:
     text = FLOW.replace("places:", "controllers: {robot: }\nplaces:").replace("start: p", "start: [q, p]")
     net = parse_net(edited(text, lambda s: edits.own(s, Kind.PLACE, "p", "robot")))
