@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -298,22 +299,27 @@ def answer_all(
     errors: list[Diagnostic] = []
     as_text = format_ in {"text", "github"}
     unread: BrokenPipeError | None = None
+
+    def tell(print_: Callable[[], None]) -> None:
+        nonlocal unread
+        try:
+            print_()
+        except BrokenPipeError as error:
+            if not written:
+                raise
+            unread = error
+
     for make in makers:
         try:
             report = make()
         except InputError as error:
             errors += error.diagnostics
             if as_text:
-                show_errors(error.diagnostics)
+                tell(partial(show_errors, error.diagnostics))
             continue
         reports.append(report)
         if as_text and unread is None:
-            try:
-                show(report)
-            except BrokenPipeError as error:
-                if not written:
-                    raise
-                unread = error
+            tell(partial(show, report))
     code = worst([*(report.exit_code for report in reports), *map(exit_code_of, errors)])
     outcome = Outcome(command, reports, errors, code)
     for kind, file in written:

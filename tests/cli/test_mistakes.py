@@ -352,11 +352,16 @@ def test_what_nobody_reads_is_unknown_and_nothing_is_violated(command: str, *, a
     assert (done.returncode, done.stderr) == (3, None if are_both_gone else "")
 
 
-def test_files_that_are_asked_for_are_written_though_nobody_reads_what_is_printed(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("last", "pipe"), [("catalogue:one_robot", "|"), ("bad.firable.yaml", "2>&1 |")])
+def test_files_that_are_asked_for_are_written_though_nobody_reads_what_is_printed(
+    tmp_path: Path, last: str, pipe: str
+) -> None:
     file = tmp_path / "firable.xml"
-    nets = "catalogue:one_robot_mc_late catalogue:one_robot"
-    command = f"{sys.executable} -m firable.cli check {nets} --write junit {file} | head -1"
-    done = subprocess.run(["bash", "-o", "pipefail", "-c", command], capture_output=True, text=True, check=False)
+    (tmp_path / "bad.firable.yaml").write_text("firable: [", "utf-8")
+    nets = f"catalogue:one_robot_mc_late {last}"
+    command = f"{sys.executable} -m firable.cli check {nets} --write junit {file} {pipe} head -1"
+    shell = ["bash", "-o", "pipefail", "-c", command]
+    done = subprocess.run(shell, capture_output=True, text=True, cwd=tmp_path, check=False)
     assert (done.returncode, done.stderr) == (3, "")
     assert file.read_text("utf-8").count("<testsuite ") == 2
 
