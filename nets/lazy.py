@@ -22,7 +22,7 @@ def loaded_when_asked(package: str, modules: Mapping[str, Iterable[str]]) -> Cal
         if name not in module_of:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         value: object = getattr(import_module(f"{package}.{module_of[name]}"), name)
-        setattr(sys.modules[package], name, value)
+        vars(sys.modules[package])[name] = value
         return value
 
     return load
