@@ -20,14 +20,19 @@ each other both would stop, and the one that was there first is the one that sho
 from __future__ import annotations
 
 import asyncio
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
-from typing import Final
+from threading import Thread
+from typing import Final, ParamSpec, TypeVar
 
 from firable.executor.drivers.binding import Binding
 from firable.executor.drivers.cancelling import ended
 from firable.executor.drivers.device import Connection, DeviceKind, Point, Shared, Use, Value, Wanted, as_number
 from firable.nets.diagnostics import Diagnostic, InputError
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 BEATS: Final = 4
 """So many beats of a heartbeat are waited for its two changes."""
@@ -36,12 +41,23 @@ SECONDS_MIN, SECONDS_MAX = 1.0, 4.0
 
 
 class _LeftBehind(ThreadPoolExecutor):
-    """Threads that nobody waits for: a name server may not answer."""
+    """Threads that nobody waits for, not even the end of the process: a name server may not answer."""
 
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Begin nothing more."""
-        del wait, cancel_futures
-        super().shutdown(wait=False, cancel_futures=True)
+    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        """Begin something on a thread of its own."""
+        future = Future[T]()
+
+        def work() -> None:
+            try:
+                result = fn(*args, **kwargs)
+            except BaseException as error:
+                future.set_exception(error)
+            else:
+                future.set_result(result)
+
+        future.set_running_or_notify_cancel()  # from now on nobody takes it back
+        Thread(target=work, daemon=True).start()
+        return future
 
 
 def listen_first(binding: Binding) -> None:

@@ -74,8 +74,9 @@ class SqliteJournal:
         self.witness_descriptor = -1
         with _failures(self.path, "opened"):
             refuse_taken_over(self.path)
+            told = self._durable()  # before the journal, which another process makes before it writes a number there
             is_new = not self.path.exists() or not self.path.stat().st_size
-            if is_new and self._durable():  # and nothing is made there
+            if is_new and told:  # and nothing is made there
                 _damaged(self.path, self._gone, is_alone=True)
             # One thread at a time uses it, and not always the same.
             self.connection = sqlite3.connect(self.path, timeout=0, isolation_level=None, check_same_thread=False)
@@ -278,18 +279,27 @@ def refuse_taken_over(path: Path | str) -> None:
         text = mark.read_text("utf-8", "replace")
     try:
         said = json.loads(text)
-        net, journal, journals = str(said["net"]), said["journal"], [str(one) for one in said["journals"]]
+        net, journal, journals = str(said["net"]), said["journal"], [Path(str(one)) for one in said["journals"]]
     except (ValueError, TypeError, KeyError):  # whatever stands there, somebody has put it there
-        net, journal, journals = "another bundle", None, [""]
+        net, journal, journals = "another bundle", None, [Path()]
     where = "" if journal is None else f" in {printable(_from_here(str(journal)))}"
     message = f"{printable(str(path))}: the journal was taken over: '{printable(net)}' goes on{where}"
     hint = "run that one; both would command the same machines"
-    if not all(Path(one).is_file() and Path(one).stat().st_size for one in journals):
+    if not all(map(_is_written, journals)):
+        mark_shown = printable(_from_here(str(mark)))
         hint = (
             "run it where its journals were brought; where the takeover was broken off, and not all of them were ever "
-            f"there, take away those that are, {printable(_from_here(str(mark)))} and each other .taken-over of it"
+            f"there, take away those that are, with their .generation, then {mark_shown} and each other .taken-over"
         )
     raise InputError([Diagnostic("F5036", message, hint)])
+
+
+def _is_written(journal: Path) -> bool:
+    """Whether something stands in a journal, as far as that can be seen here."""
+    try:
+        return journal.is_file() and journal.stat().st_size > 0
+    except (OSError, ValueError):
+        return False
 
 
 def _from_here(path: str) -> str:

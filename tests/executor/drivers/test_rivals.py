@@ -1,6 +1,8 @@
 """A run listens before it begins whether another program sends the heartbeat of one of its devices."""
 
 import asyncio
+import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from threading import Event
@@ -138,6 +140,28 @@ def test_a_name_server_that_does_not_answer_holds_up_nothing_for_longer(monkeypa
     listen_first(parse_binding(BINDING.replace("EVERY", "0.1").replace("timeout_s: 1", "timeout_s: 0.05")))
     assert asked == [], "it is still waited for by its thread"
     answered.set()
+
+
+HANGING = """
+import asyncio, time
+from firable.executor.drivers.binding import parse_binding
+from firable.executor.drivers.mqtt import Mqtt
+from firable.executor.drivers.rivals import listen_first
+
+async def connect(self, options, wanted):
+    await asyncio.to_thread(time.sleep, 600)
+
+Mqtt.connect = connect
+listen_first(parse_binding({binding!r}))
+print("listened", flush=True)
+"""
+
+
+def test_the_end_of_the_process_does_not_wait_for_a_name_server_either() -> None:
+    binding = BINDING.replace("EVERY", "0.1").replace("timeout_s: 1", "timeout_s: 0.05")
+    program = [sys.executable, "-c", HANGING.format(binding=binding)]
+    done = subprocess.run(program, capture_output=True, text=True, timeout=120, check=True)
+    assert done.stdout == "listened\n"
 
 
 @pytest.mark.parametrize("error", [LinkError("cut"), OSError("no route"), KeyError("a mistake of the library")])

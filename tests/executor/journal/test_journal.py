@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from support.examples import examples
 
 from firable.executor.journal.journal import Journal, MemoryJournal, sync_now
-from firable.executor.journal.sqlite_journal import SqliteJournal, machines_of
+from firable.executor.journal.sqlite_journal import SqliteJournal, machines_of, mark_of, mark_text
 from firable.executor.protocol.messages import Firing, Keep, Stored
 from firable.nets.diagnostics import InputError
 
@@ -419,3 +419,32 @@ def test_journal_is_locked_by_its_process_until_that_is_killed(tmp_path: Path) -
         finally:
             os.kill(holder.pid, signal.SIGKILL)
     assert sqlite(tmp_path).kept("a") == {"word": "7"}
+
+
+def test_a_journal_that_another_process_makes_meanwhile_is_in_use_and_not_damaged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[SqliteJournal] = []
+    told = SqliteJournal._durable
+
+    def makes(one: SqliteJournal) -> str | None:
+        if not made:
+            monkeypatch.undo()
+            made.append(SqliteJournal(tmp_path / "cell.journal", "d1", ("a",)))
+            made[0].write("a", [Keep("epoch", 1)])
+            sync_now(made[0])
+        return told(one)
+
+    monkeypatch.setattr(SqliteJournal, "_durable", makes)
+    with pytest.raises(InputError, match="F5033"):
+        SqliteJournal(tmp_path / "cell.journal", "d1", ("a",))
+    made[0].close()
+
+
+def test_a_journal_that_was_taken_over_into_what_cannot_be_looked_at_is_told_so(tmp_path: Path) -> None:
+    (tmp_path / "cell.journal").touch()
+    mark_of(tmp_path / "cell.journal").write_text(mark_text("cell", tmp_path / ("n" * 300), [tmp_path / ("n" * 300)]))
+    with pytest.raises(
+        InputError, match=r"F5036.*'cell' goes on in .*\n  hint: run it where its journals were brought"
+    ):
+        SqliteJournal(tmp_path / "cell.journal", "d1", ("a",))
