@@ -14,8 +14,9 @@ from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.binding import Binding, parse_binding
 from firable.executor.drivers.bound import bound_driver
 from firable.executor.drivers.device import Connection, LinkError, Point, Value, Wanted, Writes
+from firable.executor.drivers.kinds import OWN, kind_named
 from firable.executor.drivers.mqtt import Mqtt, MqttOptions
-from firable.executor.drivers.rivals import SECONDS_MAX, SECONDS_MIN, demand_alone, listen_first
+from firable.executor.drivers.rivals import SECONDS_MAX, SECONDS_MIN, demand_alone, listen_first, shows
 from firable.executor.journal.sqlite_journal import mark_of, mark_text
 from firable.executor.links.in_process import Exchange, InProcessLink
 from firable.executor.links.link import Greeting
@@ -100,6 +101,10 @@ def test_what_changes_once_or_is_no_beat_is_nobodys(shown: list[list[Value]], mo
     connection = Shows(shown)
     assert listened(monkeypatch, connection) == pytest.approx(SECONDS_MIN)
     assert connection.closed == 1
+
+
+def test_each_kind_says_whether_what_others_write_is_shown() -> None:
+    assert {name for name in OWN if shows(kind_named(name))} == {"modbus-tcp", "opcua", "mqtt"}
 
 
 def test_another_point_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
