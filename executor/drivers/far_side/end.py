@@ -8,7 +8,7 @@ protocol. The misbehaviours are those that lines and devices have: cut, silent, 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from firable.executor.drivers.device import Point, Value
@@ -21,14 +21,6 @@ class Faults:
     silent: bool = False
     delay_s: float = 0.0
     garbage: bool = False
-
-
-@dataclass
-class Shown:
-    """What an end shows, and whom it tells of what is written to it."""
-
-    values: dict[Point, Value] = field(default_factory=dict)
-    written: Callable[[Point, Value], None] = lambda _point, _value: None
 
 
 class FarEnd(Protocol):

@@ -73,6 +73,20 @@ class PseudoLine:
                 os.write(target, some)
 
 
+class LineEnd:
+    """What stands at the far end of a line, which is silent where it is cut."""
+
+    line: PseudoLine
+
+    async def cut(self) -> None:
+        """Let nothing pass."""
+        self.line.passes = False
+
+    async def mend(self) -> None:
+        """Let bytes pass again."""
+        self.line.passes = True
+
+
 def _is_left_behind(target: Path, near: str) -> bool:
     """Whether a link is that of a line that went with its process: its terminal is gone, or the new line's now."""
     return target.parent == Path(near).parent and (not target.exists() or target == Path(near))

@@ -15,7 +15,7 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 
 from firable.executor.drivers.device import Point, Value, quiet
 from firable.executor.drivers.far_side.end import Faults
-from firable.executor.drivers.far_side.line import PseudoLine
+from firable.executor.drivers.far_side.line import LineEnd, PseudoLine
 from firable.executor.drivers.far_side.ports import free_port
 from firable.executor.drivers.modbus_points import BITS, Address, address
 
@@ -151,7 +151,7 @@ class ModbusUnit(ModbusServer):
         await self.before.mend()
 
 
-class ModbusRtuEnd(ModbusServer):
+class ModbusRtuEnd(LineEnd, ModbusServer):
     """A Modbus server at one end of a pseudo-line; the driver takes the other end, or a `link` to it."""
 
     def __init__(self, link: str = "") -> None:
@@ -175,11 +175,3 @@ class ModbusRtuEnd(ModbusServer):
             await end()
             self.server = None
         self.line.close()
-
-    async def cut(self) -> None:
-        """Let nothing pass: a serial line that is cut is silent."""
-        self.line.passes = False
-
-    async def mend(self) -> None:
-        """Let bytes pass again."""
-        self.line.passes = True

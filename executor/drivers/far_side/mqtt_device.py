@@ -19,7 +19,7 @@ from aiomqtt import Client, MqttError
 from firable.executor.drivers.device import Point, Value, quiet
 from firable.executor.drivers.far_side.end import Faults, GoneError
 from firable.executor.drivers.far_side.ports import free_port
-from firable.executor.drivers.far_side.relay import Relay
+from firable.executor.drivers.far_side.relay import Relay, RelayedEnd
 
 
 def mosquitto() -> str | None:
@@ -27,7 +27,7 @@ def mosquitto() -> str | None:
     return shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin")
 
 
-class MqttEnd:
+class MqttEnd(RelayedEnd):
     """A device that takes what is written to `taken` topics, and a broker; `port` 0 takes a free one for drivers.
 
     With `secured`, drivers come by a listener of their own that has these lines of the broker's configuration.
@@ -39,7 +39,7 @@ class MqttEnd:
         quiet("firable.mqtt")
         self.taken = sorted(taken)
         self.relay = Relay(self.faults, port)
-        self.behind = self.front = 0
+        self.behind = 0
         self.broker: asyncio.subprocess.Process | None = None
         self.folder: tempfile.TemporaryDirectory[str] | None = None
         self.changes: asyncio.Queue[tuple[Point, Value]] = asyncio.Queue()
@@ -47,25 +47,20 @@ class MqttEnd:
         self.serving: asyncio.Task[None] | None = None
         self.is_ready = asyncio.Event()
 
-    @property
-    def port(self) -> int:
-        """The port at which a driver reaches the broker."""
-        return self.relay.port
-
     async def start(self, written: Callable[[Point, Value], None]) -> None:
         """Start the broker and the device."""
         self.written = written
         program = mosquitto()
         if program is None:
             raise FileNotFoundError("mosquitto is not installed")
-        self.behind = self.front = free_port()
+        self.behind = self.relay.target = free_port()
         self.folder = tempfile.TemporaryDirectory()
         configuration = Path(self.folder.name) / "mosquitto.conf"
         lines = ["per_listener_settings true", "persistence false", "set_tcp_nodelay true"]
         lines += [f"listener {self.behind} 127.0.0.1", "allow_anonymous true"]
         if self.secured:
-            self.front = free_port()
-            lines += [f"listener {self.front} 127.0.0.1", self.secured]
+            self.relay.target = free_port()
+            lines += [f"listener {self.relay.target} 127.0.0.1", self.secured]
         configuration.write_text("\n".join([*lines, ""]))
         quiet = asyncio.subprocess.DEVNULL
         # In a session of its own: Ctrl-C at the terminal is for whoever ends it, and no end of its own.
@@ -103,14 +98,6 @@ class MqttEnd:
     def show(self, point: Point, value: Value) -> None:
         """Publish a value, retained."""
         self.changes.put_nowait((point, value))
-
-    async def cut(self) -> None:
-        """Close the driver's connections, and take no new ones."""
-        await self.relay.close()
-
-    async def mend(self) -> None:
-        """Take connections again, at the same port."""
-        await self.relay.open(self.front)
 
     async def _serve(self) -> None:
         while True:

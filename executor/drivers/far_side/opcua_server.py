@@ -18,10 +18,10 @@ from asyncua.ua.uatypes import UInt32
 
 from firable.executor.drivers.device import Point, Value, quiet
 from firable.executor.drivers.far_side.end import Faults
-from firable.executor.drivers.far_side.relay import Relay
+from firable.executor.drivers.far_side.relay import Relay, RelayedEnd
 
 
-class OpcUaEnd:
+class OpcUaEnd(RelayedEnd):
     """A server in the network of this host; `port` 0 takes a free one."""
 
     def __init__(
@@ -44,12 +44,6 @@ class OpcUaEnd:
         self.written: Callable[[Point, Value], None] = lambda _point, _value: None
         self.changes: asyncio.Queue[tuple[Point, Value]] = asyncio.Queue()
         self.showing: asyncio.Task[None] | None = None
-        self.behind = 0
-
-    @property
-    def port(self) -> int:
-        """The port at which it is reached."""
-        return self.relay.port
 
     async def start(self, written: Callable[[Point, Value], None]) -> None:
         """Begin to serve."""
@@ -76,14 +70,6 @@ class OpcUaEnd:
         """Show a value to whoever has subscribed to it."""
         self.changes.put_nowait((point, value))
 
-    async def cut(self) -> None:
-        """Close all connections, and take no new ones."""
-        await self.relay.close()
-
-    async def mend(self) -> None:
-        """Take connections again, at the same port."""
-        await self.relay.open(self.behind)
-
     async def _serve(self) -> None:
         quiet("asyncua")
         self.server = Server()
@@ -105,7 +91,7 @@ class OpcUaEnd:
             self.nodes[point] = node
             self.names[node_id.to_string()] = point
         await self.server.start()
-        self.behind = self.server.bserver._server.sockets[0].getsockname()[1]
+        self.relay.target = self.server.bserver._server.sockets[0].getsockname()[1]
         self.server.subscribe_server_callback(CallbackType.PostWrite, self._taken)
 
     async def _show(self) -> None:

@@ -23,6 +23,7 @@ class Relay:
         self.garbles = garbles
         self.port = port or free_port()
         self.target = 0
+        """The port of this host that it leads to, from when it is opened."""
         self.server: asyncio.Server | None = None
         self.carrying: set[asyncio.Task[None]] = set()
         self.held: set[asyncio.Task[None]] = set()
@@ -30,9 +31,8 @@ class Relay:
         self.mark = b""
         """What is not to come there, while it is anything."""
 
-    async def open(self, target: int) -> None:
-        """Lead to a port of this host."""
-        self.target = target
+    async def open(self) -> None:
+        """Take connections."""
         self.server = await asyncio.start_server(self._accepted, "127.0.0.1", self.port)
 
     async def close(self) -> None:
@@ -88,3 +88,22 @@ class Relay:
                 writer.write(some)
                 await writer.drain()
         writer.close()
+
+
+class RelayedEnd:
+    """What drivers reach through a relay, and do not where that is cut."""
+
+    relay: Relay
+
+    @property
+    def port(self) -> int:
+        """The port at which a driver reaches it."""
+        return self.relay.port
+
+    async def cut(self) -> None:
+        """Close all connections of drivers, and take no new ones."""
+        await self.relay.close()
+
+    async def mend(self) -> None:
+        """Take connections again, at the same port."""
+        await self.relay.open()

@@ -9,11 +9,11 @@ from serial import Serial
 
 from firable.executor.drivers.device import LinkError, Point, Value
 from firable.executor.drivers.far_side.end import Faults
-from firable.executor.drivers.far_side.line import PseudoLine
+from firable.executor.drivers.far_side.line import LineEnd, PseudoLine
 from firable.executor.drivers.serial_line import Lines
 
 
-class SerialEnd:
+class SerialEnd(LineEnd):
     """A device; the driver takes the port `line.near`, or a `link` to it."""
 
     def __init__(self, link: str = "") -> None:
@@ -45,14 +45,6 @@ class SerialEnd:
         self.values[point] = value
         if not self.faults.silent:
             self._tell(point)
-
-    async def cut(self) -> None:
-        """Let nothing pass."""
-        self.line.passes = False
-
-    async def mend(self) -> None:
-        """Let bytes pass again."""
-        self.line.passes = True
 
     def _tell(self, point: Point) -> None:
         value = self.values[point]

@@ -40,10 +40,11 @@ class ModbusBehind(ModbusTcpEnd):
     def __init__(self) -> None:
         super().__init__()
         self.relay = Relay(Faults())
+        self.relay.target = self.port
 
     async def start(self, written: Callable[[Point, Value], None]) -> None:
         await super().start(written)
-        await self.relay.open(self.port)
+        await self.relay.open()
 
     async def stop(self) -> None:
         await self.relay.close()
