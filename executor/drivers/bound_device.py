@@ -73,8 +73,9 @@ class BoundDevice:
         self.channels: dict[str, Channel | Handshake] = {}
         for channel_name, body in self.document.channels.items():
             places = [place for place, one in commands.items() if one.channel == channel_name]
-            made = Channel if body.request is None else Handshake
-            self.channels[channel_name] = made(body, places, driver.answered)
+            self.channels[channel_name] = (
+                Channel(body, places, driver.answered) if body.request is None else Handshake(body, driver.answered)
+            )
         self.replies: dict[Point, list[tuple[Channel | Handshake, str]]] = {}
         for channel in self.channels.values():
             for point, key in channel.document.shows.items():

@@ -21,7 +21,6 @@ Rejected: pulses instead of levels. Whoever looks at the wrong moment never sees
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
 from enum import Enum, auto
 
 from firable.executor.drivers.binding import ChannelDocument
@@ -44,9 +43,8 @@ class _Phase(Enum):
 class Handshake:
     """The commands of one machine, one after the other; the same to its device as `channels.Channel` is."""
 
-    def __init__(self, document: ChannelDocument, places: Sequence[str], answered: frozenset[str]) -> None:
+    def __init__(self, document: ChannelDocument, answered: frozenset[str]) -> None:
         self.document = document
-        self.places = sorted(places)
         self.answered = answered
         self.shown: dict[str, int | None] = {}
         """The bits that the device shows; None for what is neither 0 nor 1."""

@@ -12,7 +12,7 @@ from firable.executor.drivers.handshake import Handshake
 def bits(*, taken: bool = True, failed: bool = True, done: bool = True) -> Handshake:
     has = {"taken": taken, "failed": failed, "done": done}
     document = ChannelDocument.model_validate({"request": "q", **{key: key for key, there in has.items() if there}})
-    one = Handshake(document, ["a", "b", "halt"], frozenset("ab"))
+    one = Handshake(document, frozenset("ab"))
     for key, there in has.items():
         if there:
             one.shows(key, 0)
@@ -193,7 +193,7 @@ def test_command_that_the_device_does_not_show_to_have_is_named_until_it_does() 
 
 
 def test_command_that_waits_for_a_bit_that_was_never_shown_is_named() -> None:
-    one = Handshake(ChannelDocument(request="q", taken="t", done="d"), ["a"], frozenset("a"))
+    one = Handshake(ChannelDocument(request="q", taken="t", done="d"), frozenset("a"))
     one.shows("taken", 0)
     one.send("a", 1, "", ())
     put(one)
