@@ -26,13 +26,12 @@ from __future__ import annotations
 import asyncio
 from collections import Counter, deque
 from collections.abc import Callable, Collection
-from typing import Final, assert_never
+from typing import TYPE_CHECKING, Final, assert_never
 
 from firable.executor.journal.journal import Journal, Storing
 from firable.executor.journal.outbox import Outbox
 from firable.executor.links.link import called
 from firable.executor.operating.clock import RunClock
-from firable.executor.operating.figures import Figures
 from firable.executor.operating.items import CommandTaken, Item, SignalRead
 from firable.executor.operating.recorder import TRACE, Recorder
 from firable.executor.protocol.controller import LocalController
@@ -57,6 +56,9 @@ from firable.executor.protocol.messages import (
 )
 from firable.nets.decomposition import Decomposition
 
+if TYPE_CHECKING:  # it needs the extra `serve`
+    from firable.executor.operating.metrics import Metrics
+
 ACTS_AT_ONCE_MAX: Final = 250
 """So many acts are one group at most; then they become durable, and the driver, the link and the operator are heard."""
 AHEAD_MAX: Final = 10_000
@@ -76,7 +78,7 @@ class Acts:
         names: Collection[str],
         journal: Journal,
         recorder: Recorder,
-        figures: Figures | None,
+        figures: Metrics | None,
         wake: Callable[[], None],
         left: Callable[[str, str], None],
         coalesced: Counter[str],

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Collection, Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from firable.executor.drivers.driver import Driver, Latched
 from firable.executor.journal.journal import Journal, MemoryJournal
@@ -37,7 +37,6 @@ from firable.executor.operating.clock import RunClock
 from firable.executor.operating.coalesced import Coalesced
 from firable.executor.operating.conduct import UNATTENDED, Conduct, Watch
 from firable.executor.operating.dispatch import Dispatch
-from firable.executor.operating.figures import Figures
 from firable.executor.operating.groups import Groups
 from firable.executor.operating.items import SignalRead
 from firable.executor.operating.latch import Latch
@@ -54,6 +53,9 @@ from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import Keep, Message, Sending
 from firable.nets.decomposition import Decomposition
+
+if TYPE_CHECKING:  # it needs the extra `serve`
+    from firable.executor.operating.metrics import Metrics
 
 _END: Final = "end"
 """Under which the journal keeps, beside the trace, that all the work of the run was done."""
@@ -76,7 +78,7 @@ class Host:
         begin_seconds: float = 0.0,
         is_complete: Callable[[], bool] = lambda: False,
         monitor: Monitor | LocalMonitor | None = None,
-        figures: Figures | None = None,
+        figures: Metrics | None = None,
         patience: Patience | None = None,
         latched: Callable[[], Latched] | None = None,
     ) -> None:

@@ -39,7 +39,10 @@ class _WithoutBirthdays:
 
 
 class Metrics:
-    """The figures of one run of a net, or of one host with these machines, which knows of no other places."""
+    """The figures of one run of a net, or of one host with these machines, which knows of no other places.
+
+    To count must not fail, and must not wait.
+    """
 
     def __init__(self, net: Net, machines: Collection[str] = ()) -> None:
         self.net = net

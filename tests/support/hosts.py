@@ -14,9 +14,9 @@ from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.links.in_process import Exchange, InProcessLink
 from firable.executor.links.link import COORDINATOR, Greeting, Link
 from firable.executor.operating.conduct import Conduct
-from firable.executor.operating.figures import Figures
 from firable.executor.operating.host import Host
 from firable.executor.operating.local_monitor import LocalMonitor
+from firable.executor.operating.metrics import Metrics
 from firable.executor.operating.recorder import KEY, TRACE, Recorder, TraceFile, size_bytes_of
 from firable.executor.operating.situation import Situation
 from firable.executor.operating.taken_up import start_of
@@ -76,7 +76,7 @@ class Cell:
         shown: Mapping[str, bool] | None = None,
         *,
         monitor: LocalMonitor | None = None,
-        figures: Figures | None = None,
+        figures: Metrics | None = None,
         **conduct: Any,
     ) -> None:
         """Start a host, or start it anew."""
