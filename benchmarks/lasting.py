@@ -19,7 +19,8 @@ from typing import Final
 from measuring import Table, timed
 
 from firable.decompose.splitting.cut import split
-from firable.executor.operating.running import RunReport, execute
+from firable.executor.operating.conduct import Conduct
+from firable.executor.operating.running import RunReport, SimulatedCell, execute
 from firable.executor.operating.situation import State
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.machines.plant_file import parse_plant
@@ -46,7 +47,8 @@ def lasted(workpieces: int) -> Lasted:
     plant = parse_plant(re.sub(r", jitter_s: [0-9.]+", "", text))
     with tempfile.TemporaryDirectory() as folder:
         journal = Path(folder) / "journal"
-        work = partial(execute, split(net), plant, workpieces=workpieces, journal_path=journal, digest=NAME)
+        cell, conduct = SimulatedCell(plant, workpieces), Conduct(journal_path=journal)
+        work = partial(execute, split(net), cell, conduct, digest=NAME)
         report, seconds = timed(work)
         if report.state is not State.DONE:
             raise RuntimeError(f"the run has not come to its end: {report.situation.message}")

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
@@ -21,7 +21,7 @@ from firable.cli.watched import AFTER_A_FAULT_OF_A_HOST, machines_verdict, show_
 from firable.nets.source import printable
 
 if TYPE_CHECKING:
-    from firable.executor.drivers.driver import Latched
+    from firable.executor.drivers.driver import Drivers, Latched
     from firable.executor.links.link import Link
     from firable.executor.operating.conduct import Conduct
     from firable.executor.operating.situation import Situation
@@ -166,20 +166,12 @@ def run_host_of(path: str, bundle: Bundle, options: HostOptions, conduct: Conduc
             f"--coordinator is of a net that names none, and in '{bundle.net.name}' '{named.name}' is the one: "
             f"it runs where --controller {named.name} does"
         )
-    driver = _drivers(bundle, machines, options)
+    drivers = _drivers(bundle, machines, options)
     link, warnings = _link(bundle, machines, options)
     for warning in warnings:
         text.show_diagnostic(warning)
     with told_aside(_told, conduct.log) as tell:
-        report = run_host(
-            bundle,
-            machines,
-            driver(latched=False),
-            link,
-            replace(conduct, tell=tell),
-            plant=plant,
-            latched=partial(driver, latched=True),
-        )
+        report = run_host(bundle, machines, drivers, link, replace(conduct, tell=tell), plant=plant)
     return Report(
         "run",
         path,
@@ -207,13 +199,7 @@ def _told(kind: str, sentence: str) -> None:
     click.echo(f"{time.strftime('%H:%M:%S')} {kind}: {sentence}", err=True)
 
 
-class _Drivers(Protocol):
-    """What makes drivers of the machines of a host."""
-
-    def __call__(self, *, latched: bool) -> Latched: ...
-
-
-def _drivers(bundle: Bundle, machines: tuple[str, ...], options: HostOptions) -> _Drivers:
+def _drivers(bundle: Bundle, machines: tuple[str, ...], options: HostOptions) -> Drivers:
     from firable.executor.operating.hosting import own_net
 
     if options.bind is not None and options.dry_run is not None:
@@ -229,7 +215,7 @@ def _drivers(bundle: Bundle, machines: tuple[str, ...], options: HostOptions) ->
         raise click.UsageError("say with --bind where the machines of this host are, or --dry-run without any")
     from firable.executor.drivers.dry_run import DryRunDriver
 
-    def dry(*, latched: bool) -> Latched:
+    def dry(*, latched: bool = False) -> Latched:
         del latched  # there is nothing to be held safe
         return DryRunDriver([net], options.dry_run or 0.0)
 

@@ -194,6 +194,14 @@ class Latched(Driver, Protocol):
         ...
 
 
+class Drivers(Protocol):
+    """What makes the driver of the machines here, and of the same machines the one that follows an emergency stop."""
+
+    def __call__(self, *, latched: bool = False) -> Latched:
+        """A driver that has not begun."""
+        ...
+
+
 class Held(Protocol[Leaving]):
     """What is held back behind the journal (`Outbox`)."""
 

@@ -49,9 +49,11 @@ class Conduct:
     """A command that is not completed within so long, by the clock of the run, is a fault."""
     operator: Operator | None = None
     service: Service | None = None
-    """Where an operator may act from elsewhere."""
+    """Where an operator may act from elsewhere, in real time."""
     log: Log | None = None
+    """Who is told what the trace notes."""
     tell: Told | None = None
+    """Who is told what an operator has to know."""
 
 
 UNATTENDED: Final = Conduct()

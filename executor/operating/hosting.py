@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import ssl
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Final
 
 from firable.executor.drivers.bound import BoundDriver
-from firable.executor.drivers.driver import Driver, Latched
+from firable.executor.drivers.driver import Drivers
 from firable.executor.drivers.rivals import listen_first
 from firable.executor.journal.sqlite_journal import refuse_taken_over
 from firable.executor.links.link import Greeting, Link
@@ -23,7 +24,7 @@ from firable.executor.operating.host import Host
 from firable.executor.operating.local_monitor import LocalMonitor
 from firable.executor.operating.monitor import Divergence
 from firable.executor.operating.own_certificate import fault_of, fault_of_authority, unloaded
-from firable.executor.operating.service import figures_for, patience_with, run_to_the_end
+from firable.executor.operating.service import demand_no_loop, figures_for, patience_with, run_to_the_end
 from firable.executor.operating.situation import Situation
 from firable.executor.operating.taken_up import opened
 from firable.executor.protocol.deciders import TOP, controller_of, coordinator_at, coordinators
@@ -176,20 +177,21 @@ def own_net(decomposition: Decomposition, machines: Sequence[str]) -> Net:
 def run_host(
     bundle: Bundle,
     machines: tuple[str, ...],
-    driver: Driver,
+    drivers: Drivers,
     link: Link,
     conduct: Conduct = UNATTENDED,
     *,
     plant: PlantModel | None = None,
-    latched: Callable[[], Latched] | None = None,
 ) -> HostReport:
     """Run a host until it is stopped (Ctrl-C, SIGTERM, an operator) or fails.
 
     Where a `plant` says what the machines should do, those here are held against it as the run goes, until it is taken
-    up or reset. With a service, and `latched` to make the driver of the same machines anew, it stays after an emergency
-    stop until that is reset. Raises `InputError` as link, journal and trace do, F5003 where the plant does not fit, and
-    F5106 where another program commands a device, before anything is written.
+    up or reset. With a service, it stays after an emergency stop until that is reset. Raises `InputError` as drivers,
+    link, journal and trace do, F5003 where the plant does not fit, and F5106 where another program commands a device,
+    before anything is written; `RuntimeError` within an event loop, before that.
     """
+    demand_no_loop()
+    driver = drivers()
     if conduct.journal_path is not None:
         refuse_taken_over(conduct.journal_path)
     if isinstance(driver, BoundDriver):
@@ -199,7 +201,6 @@ def run_host(
     if plant is not None and conduct.watch is not Watch.IGNORE:
         monitor = LocalMonitor(bundle.decomposition, controllers, plant)
     with opened(bundle.decomposition, bundle.digest, conduct.journal_path, conduct.trace, machines=machines) as files:
-        figures = figures_for(bundle.net, conduct.service, machines)
         host = Host(
             bundle.decomposition,
             driver,
@@ -210,13 +211,13 @@ def run_host(
             journal=files.journal,
             begin_seconds=files.begin_seconds,
             patience=patience_with(driver),
-            figures=figures,
+            figures=figures_for(bundle.net, conduct.service, machines),
             monitor=monitor,
-            latched=latched,
+            latched=partial(drivers, latched=True),
         )
         if files.is_taken_up:
             host.unwatch()
-        situation = run_to_the_end(host, figures)
+        situation = run_to_the_end(host)
     return HostReport(
         situation,
         machines,

@@ -62,12 +62,22 @@ def patience_with(driver: Driver) -> Patience:
     return Patience(STOP_SECONDS + own)
 
 
-def run_to_the_end(host: Host, figures: Metrics | None, *, virtual: bool = False) -> Situation:
+def demand_no_loop() -> None:
+    """Raise `RuntimeError` within an event loop: a run has one of its own, and would hold that one up to its end."""
+    try:
+        asyncio.get_running_loop()
+    except RuntimeError:
+        return
+    message = "a run has an event loop of its own: begin it outside of any, or on a thread, where no signal ends it"
+    raise RuntimeError(message)
+
+
+def run_to_the_end(host: Host, *, virtual: bool = False) -> Situation:
     """Run a host on an event loop of its own; Ctrl-C or a request to terminate ends it in order."""
     if virtual:
         situation: Situation = run_in_virtual_time(terminable(host))
         return situation
-    service = host.conduct.service
+    service, figures = host.conduct.service, host.figures
     if service is None or figures is None:
         work = terminable(host)
     else:

@@ -18,7 +18,7 @@ from firable.cli import bound_run, hosting
 from firable.cli.bound_run import run_bound_of
 from firable.cli.main import main
 from firable.cli.simulated_run import _verdicts
-from firable.executor import RunReport, execute
+from firable.executor import RunReport, SimulatedCell, execute
 from firable.executor.cell.disturbances import NeverCompletes
 from firable.executor.drivers import binding
 from firable.executor.operating import running
@@ -356,10 +356,8 @@ def test_a_net_in_the_place_of_a_bundle_is_refused_with_how_a_bundle_is_made(
 def test_a_run_that_is_stopped_at_a_divergence_tells_it_once() -> None:
     report = execute(
         decomposition_of("one_robot"),
-        plant_of("one_robot"),
-        workpieces=3,
-        disturbances=[NeverCompletes("R", "MOVE", 3)],
-        watch=Watch.STOP,
+        SimulatedCell(plant_of("one_robot"), workpieces=3, disturbances=[NeverCompletes("R", "MOVE", 3)]),
+        Conduct(watch=Watch.STOP),
     )
     assert report.divergence is not None
     through, _, machines = _verdicts(report, 3, 0)
@@ -389,10 +387,8 @@ def test_the_report_of_machines_that_are_not_as_they_are_modelled_is_as_its_sche
 ) -> None:
     ended = execute(
         decomposition_of("one_robot"),
-        plant_of("one_robot"),
-        workpieces=3,
-        disturbances=[NeverCompletes("R", "MOVE", 3)],
-        watch=Watch.STOP,
+        SimulatedCell(plant_of("one_robot"), workpieces=3, disturbances=[NeverCompletes("R", "MOVE", 3)]),
+        Conduct(watch=Watch.STOP),
     )
     monkeypatch.setattr(running, "run_bound", lambda *_, **__: ended)
     monkeypatch.setattr(binding, "read_binding", lambda _: None)

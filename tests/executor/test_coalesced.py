@@ -18,7 +18,7 @@ from firable.executor.journal.journal import MemoryJournal
 from firable.executor.operating.acts import Acts
 from firable.executor.operating.items import SignalRead
 from firable.executor.operating.recorder import Recorder
-from firable.executor.operating.running import execute
+from firable.executor.operating.running import SimulatedCell, execute
 from firable.executor.protocol.messages import Decision, VoteRequest
 from firable.nets.text import parse_net
 
@@ -67,7 +67,7 @@ def test_a_run_reports_what_its_driver_has_coalesced_though_nobody_asks_for_figu
 ) -> None:
     shown = {"robot.at_cv1": Reading(coalesced=2), "mc.done": Reading(), "robot.at_cv2": Reading(coalesced=1200)}
     monkeypatch.setattr(SimulatedDriver, "readings", lambda _: shown)
-    report: RunReport = execute(decomposition_of("one_robot"), plant_of("one_robot"), workpieces=1)
+    report: RunReport = execute(decomposition_of("one_robot"), SimulatedCell(plant_of("one_robot"), workpieces=1))
     assert report.to_json()["coalesced"] == {"robot.at_cv1": 2, "robot.at_cv2": 1200}
     show_coalesced(report.coalesced)
     assert capsys.readouterr().out == (

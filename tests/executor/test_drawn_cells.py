@@ -19,8 +19,8 @@ from firable.decompose.splitting.cut import split
 from firable.decompose.verification.happenings import Plant
 from firable.decompose.verification.same_loop import compare
 from firable.executor.cell.disturbances import Disturbance, NeverCompletes
-from firable.executor.operating.conduct import Watch
-from firable.executor.operating.running import RunReport, execute
+from firable.executor.operating.conduct import Conduct, Watch
+from firable.executor.operating.running import RunReport, SimulatedCell, execute
 from firable.executor.operating.situation import State
 from firable.nets.machines.closing import close
 from firable.nets.machines.loop import ClosedLoop, Faults, Sending
@@ -89,13 +89,8 @@ def run(cell: DrawnCell, seed: int, *, faults: Faults = Faults.NONE) -> Run:
     with suppress(CutOffError):
         report = execute(
             split(cell.net),
-            cell.plant,
-            workpieces=workpieces,
-            seed=seed,
-            trace=stream,
-            overdue_seconds=OVERDUE_SECONDS,
-            disturbances=disturbances,
-            watch=Watch.IGNORE,
+            SimulatedCell(cell.plant, workpieces=workpieces, seed=seed, disturbances=disturbances),
+            Conduct(trace=stream, overdue_seconds=OVERDUE_SECONDS, watch=Watch.IGNORE),
         )
     return Run(tuple(parse_trace(stream.getvalue()).events), workpieces, disturbances, report)
 

@@ -15,10 +15,11 @@ from firable.executor.cell.disturbances import StuckSensor
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.bench import until
 from firable.executor.drivers.dry_run import DryRunDriver
+from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.host import Host
 from firable.executor.operating.items import Item
 from firable.executor.operating.recorder import Recorder
-from firable.executor.operating.running import execute
+from firable.executor.operating.running import SimulatedCell, execute
 from firable.executor.operating.situation import State, is_deadlock
 from firable.executor.protocol.messages import ProtocolError
 from firable.executor.protocol.token_player import TokenPlayer
@@ -177,14 +178,14 @@ def test_nothing_fires_in_a_step_that_a_stop_overtakes(yields: int) -> None:
         await step
         fired.append(firings(host))
 
-    stopped = execute(circles("a", "b"), NO_MACHINES, workpieces=1, operator=operator)
+    stopped = execute(circles("a", "b"), SimulatedCell(NO_MACHINES, workpieces=1), Conduct(operator=operator))
     assert stopped.state is State.STOPPED
     assert fired[0] == fired[1]
 
 
 def test_net_that_runs_in_circles_without_its_cell_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("firable.executor.operating.groups.FIRINGS_AT_ONCE_MAX", 500)
-    report = execute(circles("a"), NO_MACHINES, workpieces=1)
+    report = execute(circles("a"), SimulatedCell(NO_MACHINES, workpieces=1))
     assert report.state is State.FAULT
     assert "fire without end" in report.situation.message
 
@@ -198,7 +199,7 @@ def test_single_steps_take_turns_among_the_controllers() -> None:
             stepped.append(await host.step())
         host.stop()
 
-    execute(circles("a", "b"), NO_MACHINES, workpieces=1, operator=operator)
+    execute(circles("a", "b"), SimulatedCell(NO_MACHINES, workpieces=1), Conduct(operator=operator))
     assert [str(name)[0] for name in stepped] == ["a", "b"] * 3
 
 
@@ -265,7 +266,7 @@ def test_command_order_of_a_wrong_net_crashes_in_the_cell() -> None:
     wrong = text.replace("{send: {machine: MC, command: UNCLAMP},             until: released, ", "{")
     assert wrong != text
     net = parse_net(wrong)
-    report = execute(split(net), plant_of("one_robot"), workpieces=2)
+    report = execute(split(net), SimulatedCell(plant_of("one_robot"), workpieces=2))
     assert report.state is State.FAULT
     assert "R pulls at a workpiece that is clamped on mc_table" in report.situation.message
 

@@ -10,8 +10,9 @@ from support.hosts import ALL_IN_ONE, CENTRE, ONE_EACH, ROBOT, TOGETHER, Cell
 from firable.decompose import split
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.links.link import COORDINATOR
+from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.peers import REPEAT_SECONDS, REPEAT_SECONDS_MAX
-from firable.executor.operating.running import execute
+from firable.executor.operating.running import SimulatedCell, execute
 from firable.executor.operating.situation import State
 from firable.executor.protocol.messages import Decision, Vote
 from firable.nets.catalogue import catalogue_net, catalogue_plant
@@ -123,7 +124,11 @@ def test_a_trace_says_who_was_lost_and_who_came_back(tmp_path: Path) -> None:
 
 def test_every_vote_of_a_whole_run_stands_in_its_trace_before_what_it_decides() -> None:
     stream = io.StringIO()
-    execute(split(catalogue_net("one_robot")), catalogue_plant("one_robot"), workpieces=2, trace=stream)
+    execute(
+        split(catalogue_net("one_robot")),
+        SimulatedCell(catalogue_plant("one_robot"), workpieces=2),
+        Conduct(trace=stream),
+    )
     trace = parse_trace(stream.getvalue())
     voted: dict[int, set[str]] = {}
     for event in trace.events:

@@ -18,7 +18,7 @@ from support.cells import decomposition_of, plant_of
 from support.examples import seeds
 
 from firable.cli.main import main
-from firable.executor import State, execute
+from firable.executor import Conduct, SimulatedCell, State, execute
 from firable.executor.cell.cell_log import CellLog
 from firable.executor.cell.plant import Plant
 from firable.executor.cell.virtual_time import run_in_virtual_time
@@ -96,13 +96,14 @@ def run_here(
 
     report = execute(
         decomposition_of("one_robot"),
-        plant_of("one_robot"),
-        workpieces=workpieces,
-        trace=folder / trace if trace else None,
-        journal_path=folder / "cell.journal",
+        SimulatedCell(plant_of("one_robot"), workpieces=workpieces),
+        Conduct(
+            trace=folder / trace if trace else None,
+            journal_path=folder / "cell.journal",
+            operator=operator or (stops if seconds is not None else None),
+            **options,
+        ),
         digest="d",
-        operator=operator or (stops if seconds is not None else None),
-        **options,
     )
     return report, read_trace(folder / trace) if trace else None
 

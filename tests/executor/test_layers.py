@@ -16,7 +16,7 @@ from support.rehearsals import BAD, ORDERLY, rehearsed
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.operating.hosting import SerialLine, machines_of, make_link, own_net
-from firable.executor.operating.running import execute
+from firable.executor.operating.running import SimulatedCell, execute
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
 from firable.executor.protocol.deciders import TOP, coordinators
@@ -88,7 +88,7 @@ def test_layers_survive_faults_of_every_kind() -> None:
 
 
 def test_the_run_of_the_two_cells_shows_who_has_decided_what() -> None:
-    report = execute(TWO_CELLS, catalogue_plant("two_cells"), workpieces=3)
+    report = execute(TWO_CELLS, SimulatedCell(catalogue_plant("two_cells"), workpieces=3))
     assert len(report.delivered) == 3
     by = {row.at or "line": 0 for row in TWO_CELLS.coordinated}
     for row in TWO_CELLS.coordinated:

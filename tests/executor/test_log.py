@@ -18,7 +18,7 @@ from support.cells import decomposition_of, plant_of
 
 from firable.cli.log import log_to
 from firable.cli.main import main
-from firable.executor import Host, State, Watch, execute
+from firable.executor import Conduct, Host, SimulatedCell, State, Watch, execute
 from firable.executor.cell.disturbances import NeverCompletes
 from firable.executor.drivers.bench import PATIENCE_S
 from firable.executor.operating.log import Log, logger_to
@@ -35,12 +35,8 @@ def test_a_log_tells_how_a_run_began_and_ended_and_what_failed_with_what_waits_f
     stream = io.StringIO()
     report = execute(
         decomposition_of("one_robot"),
-        plant_of("one_robot"),
-        workpieces=2,
-        overdue_seconds=60.0,
-        watch=Watch.IGNORE,
-        disturbances=[NeverCompletes("MC", "CLAMP", 1)],
-        log=Log(logger_to(logging.StreamHandler(stream))),
+        SimulatedCell(plant_of("one_robot"), workpieces=2, disturbances=[NeverCompletes("MC", "CLAMP", 1)]),
+        Conduct(overdue_seconds=60.0, watch=Watch.IGNORE, log=Log(logger_to(logging.StreamHandler(stream)))),
     )
     assert report.state is State.FAULT
     told = lines(stream.getvalue())
@@ -120,7 +116,11 @@ def test_a_run_that_an_error_ends_says_so_in_its_log() -> None:
     stream = io.StringIO()
     log = Log(logger_to(logging.StreamHandler(stream)))
     with pytest.raises(OSError, match="no space left"):
-        execute(decomposition_of("one_robot"), plant_of("one_robot"), workpieces=1, trace=Full(), log=log)
+        execute(
+            decomposition_of("one_robot"),
+            SimulatedCell(plant_of("one_robot"), workpieces=1),
+            Conduct(trace=Full(), log=log),
+        )
     assert [(line["event"], line.get("message")) for line in lines(stream.getvalue())][1:] == [
         ("broke", "no space left")
     ]
@@ -175,12 +175,8 @@ def test_an_error_that_a_library_lets_fall_is_a_line_of_the_log_and_no_traceback
     with log_to(str(path)) as log:
         execute(
             decomposition_of("one_robot"),
-            plant_of("one_robot"),
-            workpieces=1,
-            speed=1000.0,
-            watch=Watch.IGNORE,
-            operator=operator,
-            log=log,
+            SimulatedCell(plant_of("one_robot"), workpieces=1, speed=1000.0),
+            Conduct(watch=Watch.IGNORE, operator=operator, log=log),
         )
     (told,) = [line for line in lines(path.read_text()) if line["event"] == "unhandled"]
     assert told["level"] == "warning"

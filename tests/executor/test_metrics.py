@@ -14,10 +14,11 @@ from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.driver import Reading
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import MemoryJournal
+from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.host import Host
 from firable.executor.operating.metrics import Metrics
 from firable.executor.operating.recorder import KEY, TRACE, Recorder
-from firable.executor.operating.running import execute
+from firable.executor.operating.running import SimulatedCell, execute
 from firable.executor.operating.service import Inputs
 from firable.executor.protocol.messages import Decision, Readiness, Vote
 from firable.nets.catalogue import catalogue_net, catalogue_plant
@@ -28,7 +29,9 @@ NET = catalogue_net("one_robot")
 
 def run_of(workpieces: int) -> Trace:
     stream = io.StringIO()
-    execute(split(NET), catalogue_plant("one_robot"), workpieces=workpieces, seed=3, trace=stream)
+    execute(
+        split(NET), SimulatedCell(catalogue_plant("one_robot"), workpieces=workpieces, seed=3), Conduct(trace=stream)
+    )
     return parse_trace(stream.getvalue())
 
 

@@ -15,11 +15,11 @@ from support.watched_runs import CELLS, run_of, slower
 
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.disturbances import NeverCompletes, StuckSensor
-from firable.executor.operating.conduct import Watch
+from firable.executor.operating.conduct import Conduct, Watch
 from firable.executor.operating.host import Host
 from firable.executor.operating.local_monitor import LocalMonitor
 from firable.executor.operating.monitor import Divergence, Monitor, watch
-from firable.executor.operating.running import RunReport, execute
+from firable.executor.operating.running import RunReport, SimulatedCell, execute
 from firable.executor.operating.situation import State
 from firable.executor.protocol.commands import Answer
 from firable.nets.catalogue import catalogue_net, catalogue_plant
@@ -299,10 +299,8 @@ def test_a_run_tells_of_silence_when_it_begins_and_goes_on_or_stops_as_was_said(
     def run(watch: Watch) -> RunReport:
         return execute(
             split(catalogue_net("one_robot")),
-            catalogue_plant("one_robot"),
-            workpieces=3,
-            disturbances=[NeverCompletes("R", "MOVE", 3)],
-            watch=watch,
+            SimulatedCell(catalogue_plant("one_robot"), workpieces=3, disturbances=[NeverCompletes("R", "MOVE", 3)]),
+            Conduct(watch=watch),
         )
 
     told, stopped, ignored = run(Watch.TELL), run(Watch.STOP), run(Watch.IGNORE)
@@ -316,7 +314,11 @@ def test_a_run_tells_of_silence_when_it_begins_and_goes_on_or_stops_as_was_said(
 
 
 def test_a_run_of_machines_as_they_are_modelled_diverges_nowhere() -> None:
-    report = execute(split(catalogue_net("two_cells")), catalogue_plant("two_cells"), workpieces=5, watch=Watch.STOP)
+    report = execute(
+        split(catalogue_net("two_cells")),
+        SimulatedCell(catalogue_plant("two_cells"), workpieces=5),
+        Conduct(watch=Watch.STOP),
+    )
     assert report.state is State.DONE
     assert report.watched
     assert report.divergence is None
@@ -337,11 +339,8 @@ def test_a_divergence_is_told_and_stands_in_the_situation_as_it_comes() -> None:
 
     report = execute(
         split(catalogue_net("one_robot")),
-        catalogue_plant("one_robot"),
-        workpieces=1,
-        disturbances=[NeverCompletes("R", "MOVE", 1)],
-        operator=looking,
-        tell=lambda kind, sentence: told.append((kind, sentence)),
+        SimulatedCell(catalogue_plant("one_robot"), workpieces=1, disturbances=[NeverCompletes("R", "MOVE", 1)]),
+        Conduct(operator=looking, tell=lambda kind, sentence: told.append((kind, sentence))),
     )
     assert situations
     assert not any("modelled" in one for one in situations)
@@ -353,13 +352,14 @@ def test_machines_are_said_to_be_watched_no_more_when_a_run_goes_on_from_the_mid
         told: list[str] = []
         report = execute(
             split(catalogue_net("one_robot")),
-            catalogue_plant("one_robot"),
-            workpieces=2,
-            operator=operator,
-            journal_path=tmp_path / "journal",
-            resume=True,
-            watch=watch,
-            tell=lambda kind, _: told.append(kind),
+            SimulatedCell(catalogue_plant("one_robot"), workpieces=2),
+            Conduct(
+                operator=operator,
+                journal_path=tmp_path / "journal",
+                resume=True,
+                watch=watch,
+                tell=lambda kind, _: told.append(kind),
+            ),
         )
         return report, told.count("unwatched")
 
@@ -418,7 +418,7 @@ sensors:
 def belt_run() -> Trace:
     """A run in which each workpiece waits on the belt for 3 s, until the one before is taken away."""
     stream = io.StringIO()
-    execute(split(parse_net(BELT)), parse_plant(BELT_PLANT), workpieces=4, trace=stream)
+    execute(split(parse_net(BELT)), SimulatedCell(parse_plant(BELT_PLANT), workpieces=4), Conduct(trace=stream))
     return parse_trace(stream.getvalue())
 
 

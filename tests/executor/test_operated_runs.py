@@ -10,9 +10,10 @@ from support.cells import decomposition_of, firings, plant_of
 from firable.executor.cell.disturbances import Disturbance, NeverCompletes, StuckSensor
 from firable.executor.drivers.bench import until
 from firable.executor.drivers.simulated import SimulatedDriver
+from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.host import Host
 from firable.executor.operating.restart import uncertain
-from firable.executor.operating.running import Operator, RunReport, execute
+from firable.executor.operating.running import Operator, RunReport, SimulatedCell, execute
 from firable.executor.operating.situation import State
 from firable.executor.protocol.commands import Answer
 from firable.nets.catalogue import catalogue_net, catalogue_path
@@ -176,7 +177,9 @@ def test_a_run_that_was_stopped_at_the_end_of_its_cycle_is_taken_up_with_the_wor
     def run_on(operator: Operator | None) -> RunReport:
         cell, plant = decomposition_of("one_robot"), plant_of("one_robot")
         return execute(
-            cell, plant, workpieces=6, operator=operator, journal_path=tmp_path / "cell.journal", resume=True
+            cell,
+            SimulatedCell(plant, workpieces=6),
+            Conduct(operator=operator, journal_path=tmp_path / "cell.journal", resume=True),
         )
 
     stopped = run_on(operator)

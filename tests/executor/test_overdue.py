@@ -9,8 +9,9 @@ from support.cells import decomposition_of, plant_of
 
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.disturbances import NeverCompletes, StuckSensor
+from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.host import Host
-from firable.executor.operating.running import execute
+from firable.executor.operating.running import SimulatedCell, execute
 from firable.executor.operating.situation import State
 from firable.nets.machines.plant_file import parse_plant
 from firable.nets.text import parse_net
@@ -63,11 +64,8 @@ def test_a_timed_command_is_overdue_where_its_timeout_cannot_fire_but_not_in_a_p
 
     report = execute(
         split(parse_net(JAMMED)),
-        parse_plant(MOVER),
-        workpieces=1,
-        overdue_seconds=60.0,
-        disturbances=[NeverCompletes("M", "GO", 1)],
-        operator=pausing,
+        SimulatedCell(parse_plant(MOVER), workpieces=1, disturbances=[NeverCompletes("M", "GO", 1)]),
+        Conduct(overdue_seconds=60.0, operator=pausing),
     )
     assert seen == ([State.PAUSED] if paused_seconds else [])
     assert report.state is State.FAULT
@@ -95,4 +93,8 @@ def test_a_trace_that_breaks_while_a_command_is_overdue_ends_the_run() -> None:
 
     never = NeverCompletes("R", "GRASP", 1)
     with pytest.raises(OSError, match="no space left"):
-        execute(decomposition_of("one_robot"), plant_of("one_robot"), workpieces=1, trace=Full(), disturbances=[never])
+        execute(
+            decomposition_of("one_robot"),
+            SimulatedCell(plant_of("one_robot"), workpieces=1, disturbances=[never]),
+            Conduct(trace=Full()),
+        )

@@ -23,7 +23,8 @@ from firable.decompose.splitting.cut import split
 from firable.decompose.verification.happenings import Plant
 from firable.decompose.verification.same_loop import compare
 from firable.executor.cell.disturbances import Disturbance, NeverCompletes
-from firable.executor.operating.running import execute
+from firable.executor.operating.conduct import Conduct
+from firable.executor.operating.running import SimulatedCell, execute
 from firable.executor.operating.situation import State
 from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.machines.closing import close
@@ -49,7 +50,11 @@ def trace_of(cell: str, workpieces: int, *disturbances: Disturbance) -> tuple[St
 
 def run_of(net: Net, plant: PlantModel, workpieces: int, *disturbances: Disturbance) -> tuple[State, Trace]:
     stream = io.StringIO()
-    report = execute(split(net), plant, workpieces=workpieces, seed=1, trace=stream, disturbances=disturbances)
+    report = execute(
+        split(net),
+        SimulatedCell(plant, workpieces=workpieces, seed=1, disturbances=disturbances),
+        Conduct(trace=stream),
+    )
     return report.state, parse_trace(stream.getvalue())
 
 

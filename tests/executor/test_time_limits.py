@@ -20,7 +20,8 @@ from firable.executor.cell.disturbances import NeverCompletes
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.bench import until
 from firable.executor.drivers.dry_run import DryRunDriver
-from firable.executor.operating.running import RunReport, execute
+from firable.executor.operating.conduct import Conduct
+from firable.executor.operating.running import RunReport, SimulatedCell, execute
 from firable.executor.operating.situation import State, blocked
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.controller import LocalController
@@ -375,11 +376,8 @@ def run(*disturbances: NeverCompletes, key: float = 20.0, overdue_seconds: float
     net = catalogue_net("one_robot_timed")
     report = execute(
         split(net),
-        plant,
-        workpieces=3,
-        trace=written,
-        disturbances=disturbances,
-        overdue_seconds=overdue_seconds,
+        SimulatedCell(plant, workpieces=3, disturbances=disturbances),
+        Conduct(trace=written, overdue_seconds=overdue_seconds),
     )
     trace = parse_trace(written.getvalue())
     replay(net, trace)
@@ -424,9 +422,11 @@ def test_a_run_without_anybody_who_presses_the_key_waits_in_the_fault_place() ->
     plant = catalogue_path("one_robot_timed").with_name("one_robot_timed.plant.yaml").read_text("utf-8")
     report = execute(
         split(catalogue_net("one_robot_timed")),
-        parse_plant(plant.replace("acknowledges: R, after_s: 20", "acknowledges: CV2")),
-        workpieces=1,
-        disturbances=[NeverCompletes("R", "MOVE", 1)],
+        SimulatedCell(
+            parse_plant(plant.replace("acknowledges: R, after_s: 20", "acknowledges: CV2")),
+            workpieces=1,
+            disturbances=[NeverCompletes("R", "MOVE", 1)],
+        ),
     )
     assert report.state is State.WAITING
     assert "robot.to_cv1_fault" in report.situation.marking
@@ -440,7 +440,9 @@ def test_what_only_a_timeout_would_fire_is_not_said_to_be_waited_for() -> None:
 
 
 def test_the_timed_cell_of_the_catalogue_runs() -> None:
-    report = execute(split(catalogue_net("one_robot_timed")), catalogue_plant("one_robot_timed"), workpieces=2)
+    report = execute(
+        split(catalogue_net("one_robot_timed")), SimulatedCell(catalogue_plant("one_robot_timed"), workpieces=2)
+    )
     assert report.state is State.DONE
 
 

@@ -6,7 +6,8 @@ from collections.abc import Iterable
 from support.cells import decomposition_of, plant_of
 
 from firable.executor.cell.disturbances import Disturbance
-from firable.executor.operating.running import Operator, RunReport, execute
+from firable.executor.operating.conduct import Conduct
+from firable.executor.operating.running import Operator, RunReport, SimulatedCell, execute
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.machines.plant_file import PlantModel, parse_plant
 from firable.semantics.joining import VOTED
@@ -29,14 +30,10 @@ def run_cell(
     stream = io.StringIO()
     report = execute(
         decomposition_of(cell),
-        plant or plant_of(cell),
-        workpieces=workpieces,
-        seed=seed,
-        speed=speed,
-        trace=stream,
-        overdue_seconds=overdue_seconds,
-        disturbances=disturbances,
-        operator=operator,
+        SimulatedCell(
+            plant or plant_of(cell), workpieces=workpieces, seed=seed, speed=speed, disturbances=disturbances
+        ),
+        Conduct(trace=stream, overdue_seconds=overdue_seconds, operator=operator),
     )
     trace = parse_trace(stream.getvalue())
     replayed = replay(catalogue_net(cell), trace)

@@ -5,8 +5,8 @@ from collections.abc import Iterable
 
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.disturbances import Disturbance
-from firable.executor.operating.conduct import Watch
-from firable.executor.operating.running import execute
+from firable.executor.operating.conduct import Conduct, Watch
+from firable.executor.operating.running import SimulatedCell, execute
 from firable.executor.operating.situation import State
 from firable.nets.machines.plant_file import PlantModel, parse_plant
 from firable.nets.net import Net
@@ -97,12 +97,8 @@ def run(seed: int, *, workpieces: int = 5, disturbances: Iterable[Disturbance] =
     stream = io.StringIO()
     report = execute(
         split(net()),
-        plant(),
-        workpieces=workpieces,
-        seed=seed,
-        trace=stream,
-        disturbances=disturbances,
-        watch=Watch.IGNORE,
+        SimulatedCell(plant(), workpieces=workpieces, seed=seed, disturbances=disturbances),
+        Conduct(trace=stream, watch=Watch.IGNORE),
     )
     assert disturbances or report.state is State.DONE
     return parse_trace(stream.getvalue())

@@ -32,8 +32,9 @@ from firable.executor.journal.journal import Storing
 from firable.executor.journal.sqlite_journal import SqliteJournal
 from firable.executor.operating import groups
 from firable.executor.operating.acts import Acts
+from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.recorder import KEY, TRACE, Recorder, TraceFile, size_bytes_of
-from firable.executor.operating.running import execute
+from firable.executor.operating.running import SimulatedCell, execute
 from firable.executor.protocol.deciders import coordinators
 
 LIVES_MAX = 300
@@ -127,14 +128,9 @@ def live(folder: Path, cell: str, workpieces: int, seed: int, last: int, speed: 
         moments.while_storing()
     report = execute(
         decomposition_of(cell),
-        plant_of(cell),
-        workpieces=workpieces,
-        seed=seed,
-        trace=folder / "trace.jsonl",
-        journal_path=folder / "cell.journal",
+        SimulatedCell(plant_of(cell), workpieces=workpieces, seed=seed, speed=speed),
+        Conduct(trace=folder / "trace.jsonl", journal_path=folder / "cell.journal", resume=True),
         digest="d",
-        resume=True,
-        speed=speed,
     )
     (folder / "report.json").write_text(json.dumps(report.to_json()))
 

@@ -5,8 +5,8 @@ from functools import cache
 
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.disturbances import Disturbance
-from firable.executor.operating.conduct import Watch
-from firable.executor.operating.running import execute
+from firable.executor.operating.conduct import Conduct, Watch
+from firable.executor.operating.running import SimulatedCell, execute
 from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.machines.plant_file import Move, PlantModel
 from firable.semantics.trace import Trace, parse_trace
@@ -39,12 +39,8 @@ def _run(cell: str, plant: PlantModel, disturbances: tuple[Disturbance, ...], wo
     stream = io.StringIO()
     execute(
         split(catalogue_net(cell)),
-        plant,
-        workpieces=workpieces,
-        seed=seed,
-        trace=stream,
-        disturbances=disturbances,
-        watch=Watch.IGNORE,
+        SimulatedCell(plant, workpieces=workpieces, seed=seed, disturbances=disturbances),
+        Conduct(trace=stream, watch=Watch.IGNORE),
     )
     return parse_trace(stream.getvalue())
 

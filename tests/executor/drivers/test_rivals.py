@@ -4,6 +4,7 @@ import asyncio
 import subprocess
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from threading import Event
 
@@ -193,7 +194,7 @@ def test_a_run_that_is_not_alone_leaves_no_journal_and_no_trace(
     read = read_bundle(bundle(tmp_path, "cell", OLD))
     binding, conduct = parse_binding(BOUND), Conduct(journal_path=tmp_path / "journal", trace=tmp_path / "trace")
     here = ("robot",)
-    driver = bound_driver(binding, read.net, own_net(read.decomposition, here))
+    drivers = partial(bound_driver, binding, read.net, own_net(read.decomposition, here))
 
     def not_alone(bound: Binding) -> None:
         assert set(bound.document.devices) == {"plc"}
@@ -202,7 +203,14 @@ def test_a_run_that_is_not_alone_leaves_no_journal_and_no_trace(
     for module in ("running", "hosting"):
         monkeypatch.setattr(f"firable.executor.operating.{module}.listen_first", not_alone)
     link = InProcessLink(Exchange(), Greeting(read.digest, here))
-    runs = (lambda: run_bound(read, binding, conduct), lambda: run_host(read, here, driver, link, conduct))
+    runs = (lambda: run_bound(read, binding, conduct), lambda: run_host(read, here, drivers, link, conduct))
+
+    async def within_a_loop() -> None:
+        for run in runs:
+            with pytest.raises(RuntimeError, match="a run has an event loop of its own"):
+                run()
+
+    asyncio.run(within_a_loop())
     for run in runs:
         with pytest.raises(InputError, match="F5106"):
             run()
