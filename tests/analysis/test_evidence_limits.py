@@ -39,7 +39,7 @@ from firable.analysis.evidence.read_off import eager_cycle
 from firable.analysis.evidence.refusal import TimeIsOverError
 from firable.analysis.goal import Limits
 from firable.analysis.induction.smt import Term
-from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
+from firable.analysis.spaces.reachability import REASONS, Budget, ReachabilityGraph, explore
 from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.nets.catalogue import catalogue_net
 from firable.nets.catalogue.families import family_net
@@ -361,6 +361,9 @@ def test_the_time_of_one_search_is_no_reason_why_a_smaller_one_has_too_few_marki
         (BudgetExceeded("max_seconds is over"), "the time for evidence was over"),
         (BudgetExceeded("max_memory_bytes is used up"), "the memory for evidence was used up"),
         (IncompleteGraph("the exploration ended early: memory"), "the memory for evidence was used up"),
+        (IncompleteGraph("the exploration ended early: markings"), "the markings for evidence were used up"),
+        (IncompleteGraph(f"5 markings found, 7 edges followed: {REASONS['time']}"), "the time for evidence was over"),
+        (BudgetExceeded("the search for a run was given up"), "the search for a run was given up"),
     ],
 )
 def test_what_asks_a_space_out_of_its_budget_beside_its_claims_is_lacking(

@@ -16,7 +16,7 @@ from support.second_solver import by_cvc5
 
 from firable.analysis.check import check
 from firable.analysis.evidence.document import Document
-from firable.analysis.evidence.producing.lacking import NO_MEMORY, NO_TIME
+from firable.analysis.evidence.producing.lacking import NO_MARKINGS, NO_MEMORY, NO_TIME
 from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.goal import Limits
 from firable.analysis.induction.smt import Answer, Decision, Operator, Terms, value
@@ -528,6 +528,7 @@ def test_protocol_proof_says_of_a_split_what_it_says_where_all_that_it_assumes_i
         ("nothing shows it", "F4003", "allow more time to look for evidence, with --max-seconds"),
         (NO_TIME, "F3004", "allow more time to look for evidence, with --max-seconds"),
         (NO_MEMORY, "F3004", "allow more memory, with --max-memory"),
+        (NO_MARKINGS, "F4003", "that is a limit of size, which no time moves"),
         ("ranks are written for up to 250,000 markings", "F4003", "that is a limit of size, which no time moves"),
     ],
 )

@@ -7,6 +7,8 @@ from typing import Final
 
 NO_TIME: Final = "the time for evidence was over"
 NO_MEMORY: Final = "the memory for evidence was used up"
+NO_MARKINGS: Final = "the markings for evidence were used up"
+_ENDED: Final = {"memory": NO_MEMORY, "markings": NO_MARKINGS, "time": NO_TIME, "seconds": NO_TIME}
 
 
 class LackingError(Exception):
@@ -14,12 +16,16 @@ class LackingError(Exception):
 
 
 def which_ended(error: Exception) -> str:
-    """Which budget for evidence ended, of an error that says that one did.
+    """Which budget for evidence ended, of an error that says that one did; of any other what it says.
 
     >>> which_ended(RuntimeError("max_memory_bytes is used up"))
     'the memory for evidence was used up'
+    >>> which_ended(RuntimeError("80 markings found, 95 edges followed: the budget of time is used up"))
+    'the time for evidence was over'
     """
-    return NO_MEMORY if "memory" in str(error) else NO_TIME
+    said = str(error)
+    end = said.rpartition(": ")[2]  # before it stands how far the search came
+    return next((reason for word, reason in _ENDED.items() if word in end), said)
 
 
 def is_of_budget(reason: str) -> bool:
@@ -42,4 +48,4 @@ def is_of_size(reason: str) -> bool:
     >>> is_of_size("ranks for a response are written for up to 250,000 markings"), is_of_size(NO_TIME)
     (True, False)
     """
-    return re.search("[0-9] markings$", reason) is not None
+    return reason.endswith(NO_MARKINGS) or re.search("[0-9] markings$", reason) is not None
