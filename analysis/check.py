@@ -65,7 +65,8 @@ ALONE_STEPS: Final = 50
 """How long runs it unrolls then: a solver takes longer for each further step, and comes to no end by itself."""
 AGAIN: Final = "ask again, and let it come to its end"
 """What helps where Ctrl-C has ended a search."""
-_INTERRUPTED: Final = "interrupted"
+INTERRUPTED: Final = "interrupted"
+"""What the course of a report tells of Ctrl-C."""
 _ALONE_SECONDS: Final = 0.1
 """How long techniques that hold all markings are alone, before others begin beside them."""
 _SPACES_SHARE: Final = 0.6  # of the time, for techniques that hold all markings
@@ -90,11 +91,13 @@ def check(
     queries: Sequence[Query] = (),
     progress: Callable[[int, int], object] | None = None,
     tell: Callable[[str], object] | None = None,
+    interrupted: Event | None = None,
 ) -> CheckReport:
     """Decide every verdict on a net under a discipline, external gates free, by the method named.
 
     The verdicts on `queries` follow those on the net's own properties. `progress` is told how many markings and edges
-    are found, and `tell` in words how far it is with verdicts that are settled one by one.
+    are found, and `tell` in words how far it is with verdicts that are settled one by one. Ctrl-C, which leaves unknown
+    what is not decided yet, sets `interrupted`; where it is set already, for another net, nothing is begun.
 
     Raises `InputError` F2001 where two queries have one name, F2013 where the arbiters do not fit the conflicts of the
     net, F3004 where the budget does not hold the net itself, F3006 where the method knows no synchronous steps.
@@ -108,7 +111,7 @@ def check(
     if twice := {name for name, count in Counter(query.name for query in queries).items() if count > 1}:
         message = f"'{min(twice)}' is the name of two queries"
         raise InputError([Diagnostic("F2001", message, "give each query a name of its own")])
-    interrupted = Event()
+    interrupted = interrupted or Event()
     deadline = Deadline(cancelled=interrupted)
     if budget.seconds is not None:
         deadline = Deadline.after(budget.seconds, interrupted)
@@ -116,11 +119,13 @@ def check(
     if discipline is Discipline.STEP and method not in {Method.EXPLICIT, Method.AUTO}:
         message = f"the method '{method}' knows no synchronous steps"
         raise InputError([Diagnostic("F3006", message, "leave out --method, or name `explicit`")])
-    if method is Method.EXPLICIT or discipline is Discipline.STEP:
+    if interrupted.is_set():
+        report = one.unasked()
+    elif method is Method.EXPLICIT or discipline is Discipline.STEP:
         report = one.explicitly()
     else:
         report = one.automatically() if method is Method.AUTO else one.by(method)
-    return _left_off(report) if _INTERRUPTED in report.course else report
+    return _left_off(report) if INTERRUPTED in report.course else report
 
 
 @dataclass(frozen=True)
@@ -135,6 +140,15 @@ class _Check:
     queries: tuple[Query, ...]
     progress: Callable[[int, int], object] | None
     tell: Callable[[str], object] | None
+
+    def unasked(self) -> CheckReport:
+        """The report where Ctrl-C has come before: what M0 alone does not decide is unknown."""
+        report = self._report(self._nothing())
+        verdicts = (
+            replace(verdict, bound=INTERRUPTED, hint=AGAIN) if verdict.status is Status.UNKNOWN else verdict
+            for verdict in report.verdicts
+        )
+        return _told(replace(report, verdicts=tuple(verdicts)), [INTERRUPTED])
 
     def explicitly(self) -> CheckReport:
         """The report of the explicit engine alone, within the whole budget."""
@@ -245,12 +259,15 @@ class _Check:
             if self.interrupted.is_set():
                 raise
             self.interrupted.set()
-            return _told(report_on(space, self.queries, known), [_INTERRUPTED])
+            return _told(report_on(space, self.queries, known), [INTERRUPTED])
 
     def _explored(self, graph: ReachabilityGraph) -> CheckReport:
         """The report on a graph, and whether Ctrl-C ended the graph: then its figures are not those of the net."""
-        ended = [_INTERRUPTED] if graph.engine.reason == "interrupted" else []
-        return _told(self._report(graph), [f"explored: {_size(graph)}", *ended])
+        report = _told(self._report(graph), [f"explored: {_size(graph)}"])
+        if graph.engine.reason != "interrupted":
+            return report
+        self.interrupted.set()  # not before: what was found is still asked
+        return _told(report, [INTERRUPTED])
 
     def _explore(self, budget: Budget, threads: int = 1) -> ReachabilityGraph:
         """Some markings, or all; by as many threads whatever the machine, since they say how markings are numbered."""
@@ -283,7 +300,7 @@ class _Check:
                     course.append(f"{outcome.winner} was the first to hold all markings: {_size(space)}")
             except KeyboardInterrupt:  # nothing else is begun, and what is known is reported
                 self.interrupted.set()
-                course.append(_INTERRUPTED)
+                course.append(INTERRUPTED)
             finally:
                 enough.set()
         begun.result()

@@ -92,8 +92,11 @@ def loop_report(
 ) -> Report:
     """The report on one net with its machines; the evidence on each of its loops goes into a folder.
 
-    How far exploring is, is told as `progress_line` does.
+    How far exploring is, is told as `progress_line` does. One Ctrl-C ends all that is asked.
     """
+    from threading import Event
+
+    from firable.analysis.check import INTERRUPTED
     from firable.analysis.cures.finding import with_circle
     from firable.analysis.loop.faults import ask_faults
     from firable.analysis.loop.verdicts import check_loop
@@ -103,17 +106,20 @@ def loop_report(
     loaded = load_found(argument)
     demand_bound(bind, loaded.net)
     model = read_machines_of(machines, loaded.net)
+    interrupted = Event()
     with progress_line(progress) as line:
         with loaded.placing():
-            report = check_loop(loaded.net, model, allowed, progress=line)
-        faults = ask_faults(report.asked, model, allowed, progress=line)
+            report = check_loop(loaded.net, model, allowed, progress=line, interrupted=interrupted)
+        faults = ask_faults(report.asked, model, allowed, progress=line, interrupted=interrupted)
     files: tuple[str, ...] = ()
     if loop_file is not None:
         files = write_net(loop_file, report.closed.net)
     if evidence_dir is not None:
         loops = {"loop": report.asked, "loop.failing": faults.for_good, "loop.repaired": faults.repaired}
         files += write_folder(evidence_dir, _documents(loaded.net.name, loops, allowed))
-    figures = report.closed.figures
+    figures, course = report.closed.figures, report.closed.course
+    if interrupted.is_set() and INTERRUPTED not in course:  # it came when something else was asked
+        course += (INTERRUPTED,)
     with loaded.placing():
         told = (with_circle(loaded.net, verdict) for verdict in report.verdicts)
         verdicts = held_to(loaded.net.expected, (*told, *faults.verdicts()))
@@ -124,7 +130,7 @@ def loop_report(
         verdicts,
         discipline="interleaving",
         notes=(*loaded.notes, *late_limits(model, loaded.net)),
-        course=report.closed.course,
+        course=course,
         files=files,
         binding=bind or "",
         loop_net=report.loop.net,
@@ -137,6 +143,7 @@ def loop_report(
             "places": len(report.loop.net.places),
             "transitions": len(report.loop.net.transitions),
             "markings_gates_free": report.opened.figures.markings,
+            "complete_gates_free": report.opened.figures.complete,
             "comparison": [_compared(one) for one in report.differences],
             **({"faults_not_asked": f"fault.MACHINE is not asked of {unasked}"} if (unasked := faults.unasked) else {}),
         },
@@ -174,9 +181,9 @@ def show_loop(report: Report, *, verbose: bool) -> None:
     show_binding(report)
     counts = [(loop["places"], "place"), (loop["transitions"], "transition"), (loop["markings"], "marking")]
     edges = "edges not counted" if loop["edges"] is None else text.counted(loop["edges"], "edge")
-    whole = "" if loop["complete"] else " so far"
+    whole, whole_free = ("" if loop[which] else " so far" for which in ("complete", "complete_gates_free"))
     click.echo(f"  the loop has {', '.join(text.counted(n, word) for n, word in counts)} and {edges}{whole}")
-    click.echo(f"  {text.counted(loop['markings_gates_free'], 'marking')} with gates free")
+    click.echo(f"  {text.counted(loop['markings_gates_free'], 'marking')} with gates free{whole_free}")
     if verbose or len(report.course) > 1:
         for line in report.course:
             click.echo(f"  {line}")

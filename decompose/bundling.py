@@ -15,6 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Final
 
+from firable.analysis.check import AGAIN
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.producing.lacking import NO_TIME, is_of_budget, is_of_size, what_to_allow
 from firable.analysis.evidence.producing.producer import evidence_of_report
@@ -164,7 +165,12 @@ def _given_up(proof: ProofReport) -> Iterator[Diagnostic]:
 
 
 def seen_by(verdict: Verdict, net: str = "NET", plant: str = "PLANT") -> str:
-    """How one comes to see of a verdict on a closed loop what it is: by more time, or where the run is shown."""
+    """How one comes to see of a verdict on a closed loop what it is: by more time, or where the run is shown.
+
+    Nothing where Ctrl-C has left it unknown, since the verdict says how already.
+    """
+    if verdict.hint == AGAIN:
+        return ""
     if verdict.status is Status.UNKNOWN:
         return _MORE
     command = "prove" if verdict.name.startswith("o4.") else "check"

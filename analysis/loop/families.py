@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
+from threading import Event
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from firable.analysis.check import check
@@ -154,11 +155,12 @@ def answers(
     budget: Budget | None = None,
     *,
     progress: Callable[[int, int], object] | None = None,
+    interrupted: Event | None = None,
 ) -> Answered:
-    """Ask each family of a loop; raises `InputError` as `check` does."""
+    """Ask each family of a loop, with `progress` and `interrupted` of `check`; raises `InputError` as it does."""
     families = tuple(families)
     properties = tuple(prop for family in families for prop in family.of.values())
-    report = check(replace(loop.net, properties=properties), budget=budget, progress=progress)
+    report = check(replace(loop.net, properties=properties), budget=budget, progress=progress, interrupted=interrupted)
     return Answered(loop, families, (), report).doubting(())
 
 

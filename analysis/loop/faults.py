@@ -16,6 +16,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
+from threading import Event
 from typing import Final
 
 from firable.analysis.loop.families import Answered, Family, answers, fires, never, possible
@@ -82,17 +84,20 @@ def ask_faults(
     live: tuple[str, ...] | None = None,
     *,
     progress: Callable[[int, int], object] | None = None,
+    interrupted: Event | None = None,
 ) -> FaultsAsked:
     """Ask what the faults that the plant file declares do to a cell; `asked` are the answers without faults.
 
     `live` are the transitions that a fault can take something of, unless somebody knows better those that may be live.
+    `progress` and `interrupted` are those of `check`.
     """
     net, live = asked.loop.cell, live_in(asked) if live is None else live
     for_good, repaired = close(net, model, Faults.FOR_GOOD), close(net, model, Faults.REPAIRED)
     # Of a cell in which nothing is live, a fault takes nothing, and repair cannot give it back.
     recoveries = [_recovery(repaired, machine, live) for machine in repaired.failed] if live else []
-    lasting = answers(for_good, _for_good(for_good, live), budget, progress=progress) if for_good.failed else None
-    mended = answers(repaired, recoveries, budget, progress=progress) if recoveries else None
+    ask = partial(answers, budget=budget, progress=progress, interrupted=interrupted)
+    lasting = ask(for_good, _for_good(for_good, live)) if for_good.failed else None
+    mended = ask(repaired, recoveries) if recoveries else None
     # Of what only may be live, nobody knows whether it is the fault that it cannot fire again.
     doubted = set(live).difference(known_live(asked))
     return FaultsAsked(

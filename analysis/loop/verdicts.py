@@ -21,6 +21,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, fields, is_dataclass, replace
 from itertools import combinations
+from threading import Event
 from typing import Final
 
 from firable.analysis.check import check
@@ -110,20 +111,21 @@ def check_loop(
     budget: Budget | None = None,
     *,
     progress: Callable[[int, int], object] | None = None,
+    interrupted: Event | None = None,
 ) -> LoopReport:
     """Decide every verdict on a net with the machines of a plant, and compare it with gates free.
 
-    Raises `InputError` as `close` does, and as `check` does.
+    `progress` and `interrupted` are those of `check`. Raises `InputError` as `close` does, and as `check` does.
 
     >>> from firable.nets.catalogue import catalogue_net, catalogue_plant
     >>> report = check_loop(catalogue_net("one_robot"), catalogue_plant("one_robot"))
     >>> report.closed.figures.markings, str(report.status), any(one.differs for one in report.differences)
     (903, 'proved', False)
     """
-    asked = ask_loop(net, model, budget, progress=progress)
+    asked = ask_loop(net, model, budget, progress=progress, interrupted=interrupted)
     unclear = (_not_asked(of) for of in net.properties if _unclear(model, of))
     verdicts = (*asked.verdicts, *unclear)
-    opened = check(net, budget=budget, progress=progress)
+    opened = check(net, budget=budget, progress=progress, interrupted=interrupted)
     return LoopReport(asked, verdicts, tuple(_differences(verdicts, opened)), opened)
 
 
@@ -133,14 +135,15 @@ def ask_loop(
     budget: Budget | None = None,
     *,
     progress: Callable[[int, int], object] | None = None,
+    interrupted: Event | None = None,
 ) -> Answered:
     """Ask everything of a net with the machines of a plant, but for properties of which the answer would be empty.
 
-    Raises `InputError` as `close` does, and as `check` does.
+    `progress` and `interrupted` are those of `check`. Raises `InputError` as `close` does, and as `check` does.
     """
     loop = close(net, model)
     of_the_file = (_family_of(loop, of) for of in net.properties if not _unclear(model, of))
-    return answers(loop, (*_families(loop), *of_the_file), budget, progress=progress)
+    return answers(loop, (*_families(loop), *of_the_file), budget, progress=progress, interrupted=interrupted)
 
 
 def live_in(asked: Answered) -> tuple[str, ...]:

@@ -14,8 +14,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from hashlib import sha256
+from threading import Event
 from typing import Final
 
+from firable.analysis.check import AGAIN
 from firable.analysis.evidence.document import Record
 from firable.analysis.goal import Limits
 from firable.analysis.loop.families import Answered, Family
@@ -47,18 +49,18 @@ def sealed_loops(
     """The verdicts on a net with the machines of a plant file, given as its text, and the files that they name.
 
     `limits` are those of each document. A verdict of which a part is not shown names no evidence, and the third that is
-    returned tells by its name why. Raises `InputError`
-    as `close` does, and as `check` does, and F4003 where a loop could not be held against the plant file again.
+    returned tells by its name why. One Ctrl-C ends the questions to all loops. Raises `InputError` as `close` does, and
+    as `check` does, and F4003 where a loop could not be held against the plant file again.
     """
     net, model = decomposition.net, parse_plant(plant)
     _see_compared(net, model)
-    sealing = _Sealing(plant, limits)
-    held = held_gates(decomposition, model)
+    sealing, interrupted = _Sealing(plant, limits), Event()
+    held = held_gates(decomposition, model, interrupted=interrupted)
     sealing.add(EVIDENCE, held.asked, held.verdicts)
-    loop = ask_loop(net, model)
+    loop = ask_loop(net, model, interrupted=interrupted)
     lost = sealing.add(LOOP, loop, loop.verdicts)[LIVE]
     # A fault takes nothing of what is not live without it: but only of what is shown not to be.
-    faults = ask_faults(loop, model, live=without(loop, lost))
+    faults = ask_faults(loop, model, live=without(loop, lost), interrupted=interrupted)
     for file, asked in ((FAILING, faults.for_good), (REPAIRED, faults.repaired)):
         if asked is not None:
             sealing.add(file, asked, asked.verdicts)
@@ -99,7 +101,7 @@ class _Sealing:
         records = {record.name: record for record in document.records}
         for family, verdict in zip(asked.families, told, strict=True):
             unproved = verdict.weight is Weight.REQUIRED and not verdict.holds
-            self.verdicts.append(verdict if unproved else _as_shown(family, records, file, self.method))
+            self.verdicts.append(verdict if unproved else _as_shown(family, records, file, self.method, verdict.hint))
             of = filter(None, (records.get(f"property.{prop.name}") for prop in family.of.values()))
             if (why := next((record.lacking for record in of if record.lacking), "")) and not unproved:
                 self.lacking[family.name] = why
@@ -112,8 +114,8 @@ def _shown_to_fail(family: Family, records: Mapping[str, Record]) -> list[str]:
     return [one for one, record in of if record is not None and not record.proved and not record.lacking]
 
 
-def _as_shown(family: Family, records: Mapping[str, Record], file: str, method: str) -> Verdict:
-    """The verdict on a family as the records on its properties show it."""
+def _as_shown(family: Family, records: Mapping[str, Record], file: str, method: str, hint: str) -> Verdict:
+    """The verdict on a family as the records on its properties show it; of its hint stays that Ctrl-C left it open."""
     decided = {of: records[f"property.{p.name}"] for of, p in family.of.items() if f"property.{p.name}" in records}
     violated = [of for of, record in decided.items() if not record.proved]
     whole = Status.PROVED if len(decided) == len(family.of) else Status.UNKNOWN
@@ -125,6 +127,7 @@ def _as_shown(family: Family, records: Mapping[str, Record], file: str, method: 
         family.statement,
         method,
         family.weight,
+        hint=AGAIN if status is Status.UNKNOWN and hint == AGAIN else "",
         bound=UNDECIDED if status is Status.UNKNOWN else "",
         subjects=tuple(of for of in violated if of),
         evidence=(file, PLANT) if shown else (),

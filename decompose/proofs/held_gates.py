@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from threading import Event
 
 from firable.analysis.goal import Limits
 from firable.analysis.loop.families import ENDED, Answered, Family, all_of, answers, any_of, never
@@ -71,10 +72,16 @@ class HeldGates:
         return {EVIDENCE if data.startswith(b"{") else f"{EVIDENCE}.gz": data}
 
 
-def held_gates(decomposition: Decomposition, model: PlantModel, budget: Budget | None = None) -> HeldGates:
+def held_gates(
+    decomposition: Decomposition,
+    model: PlantModel,
+    budget: Budget | None = None,
+    *,
+    interrupted: Event | None = None,
+) -> HeldGates:
     """The verdict on each assumption O4 with the machines of a plant, on gates of completions, and on late commands.
 
-    Raises `InputError` as `close` does.
+    `interrupted` is that of `check`. Raises `InputError` as `close` does.
     """
     loop = close(decomposition.net, model, sending=Sending.LATE)
     rows = {row.name: row for row in decomposition.coordinated}
@@ -111,7 +118,7 @@ def held_gates(decomposition: Decomposition, model: PlantModel, budget: Budget |
             hint="let a completion of the one machine gate the command to the other",
         )
     )
-    answered = answers(loop, families, budget)
+    answered = answers(loop, families, budget, interrupted=interrupted)
     every = [(one,) for one in assumptions(decomposition)] + [tuple(completions), ()]
     shown = (_shown(loop, decomposition, verdict, ones) for verdict, ones in zip(answered.verdicts, every, strict=True))
     return HeldGates(tuple(shown), answered)

@@ -8,6 +8,7 @@ from threading import Event
 from typing import Any
 
 import pytest
+from support.interrupting import ended
 
 from firable.analysis import check as module
 from firable.analysis._engine import IncompleteGraph
@@ -19,8 +20,10 @@ from firable.analysis.report import CheckReport, report_on
 from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
 from firable.nets.catalogue import catalogue_net
 from firable.nets.diagnostics import InputError
+from firable.nets.net import Net
 from firable.nets.queries import parse_query
 from firable.nets.verdict import Status
+from firable.semantics.trace import Discipline
 
 
 @pytest.mark.parametrize("method", [*GOALS, *SPACES, *KNOWERS])
@@ -97,30 +100,39 @@ def test_an_interrupted_report_is_made_of_what_is_known(monkeypatch: pytest.Monk
 def test_what_an_interruption_leaves_unknown_is_no_matter_of_the_budget(
     monkeypatch: pytest.MonkeyPatch, reason: str, *, is_again: bool
 ) -> None:
-    class Ended:
-        """A graph of the engine that has ended so, whatever has ended it."""
-
-        def __init__(self, engine: Any) -> None:
-            self.engine = engine
-            self.reason = reason
-
-        def __getattr__(self, name: str) -> Any:
-            return getattr(self.engine, name)
-
-    def ended(*of: Any, **by: Any) -> ReachabilityGraph:
-        graph = explore(*of, **by)
-        engine: Any = Ended(graph.engine)
-        return replace(graph, engine=engine)
+    def early(*of: Any, **by: Any) -> ReachabilityGraph:
+        return ended(explore(*of, **by), reason)
 
     def interrupted(*arguments: Any) -> CheckReport:
         monkeypatch.setattr("firable.analysis.check.report_on", report_on)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("firable.analysis.check.explore", ended)
+    monkeypatch.setattr("firable.analysis.check.explore", early)
     monkeypatch.setattr("firable.analysis.check.report_on", interrupted)
     report = check(catalogue_net("one_robot"), budget=Budget(markings=5), method="explicit")
     assert report.verdict("live").status is Status.UNKNOWN
     assert (report.verdict("live").hint == AGAIN) is is_again
+
+
+def test_ctrl_c_is_told_to_who_asks_of_other_nets_of_which_nothing_is_begun_then(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    explored: list[int] = []
+
+    def early(net: Net, discipline: Discipline, budget: Budget, **by: Any) -> ReachabilityGraph:
+        explored.append(budget.markings)
+        return ended(explore(net, discipline, replace(budget, markings=min(5, budget.markings)), **by))
+
+    monkeypatch.setattr("firable.analysis.check.explore", early)
+    interrupted = Event()
+    first = check(catalogue_net("one_robot"), interrupted=interrupted)
+    assert interrupted.is_set()
+    assert first.verdict("live").bound == "5 markings found, 6 edges followed: interrupted"
+    second = check(catalogue_net("one_robot_mc_late"), interrupted=interrupted)
+    assert explored == [module.FIRST_MARKINGS, 1]
+    assert second.course == ("interrupted",)
+    assert (second.verdict("live").bound, second.verdict("live").hint) == ("interrupted", AGAIN)
+    assert second.verdict("self-loops").holds, "nobody has to explore anything for that"
 
 
 def test_interrupted_twice_ends_all(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import importlib
-from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from typing import Any
 
 import pytest
+from support.interrupting import ended
 
 from firable.analysis.check import check
 from firable.analysis.report import CheckReport
@@ -26,17 +26,6 @@ transitions:
   t: {from: a.p, to: a.q}
   u: {from: a.q, to: a.p}
 """
-
-
-@dataclass(frozen=True)
-class _Interrupted:
-    """A graph of the engine that Ctrl-C has ended."""
-
-    graph: Any
-    reason: str = "interrupted"
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.graph, name)
 
 
 @pytest.fixture
@@ -207,9 +196,7 @@ def test_an_exploration_that_was_interrupted_is_not_kept_though_it_decided_all(
     explore = module.explore
 
     def interrupted(*of: Any, **by: Any) -> ReachabilityGraph:
-        graph: ReachabilityGraph = explore(*of, **by)
-        engine: Any = _Interrupted(graph.engine)
-        return replace(graph, engine=engine)
+        return ended(explore(*of, **by))
 
     with monkeypatch.context() as patch:
         patch.setattr(module, "explore", interrupted)

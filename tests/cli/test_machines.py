@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import pytest
+from support.interrupting import ended
 
 from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.producing import spaces
 from firable.analysis.goal import Limits
-from firable.analysis.spaces.reachability import Budget
+from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
 from firable.cli.main import main
 from firable.decompose import bundling
 from firable.decompose.proofs import closed_loops
@@ -21,6 +24,8 @@ from firable.decompose.proofs.held_gates import HeldGates, held_gates
 from firable.nets.catalogue import catalogue_path
 from firable.nets.decomposition import Decomposition
 from firable.nets.machines.plant_file import PlantModel
+from firable.nets.net import Net
+from firable.semantics.trace import Discipline
 
 SCHEMA = json.loads(files("firable.cli").joinpath("report.schema.json").read_text(encoding="utf-8"))
 CELL, PLANT = "catalogue:one_robot", "catalogue:one_robot"
@@ -269,6 +274,52 @@ def test_what_was_tried_where_the_first_markings_are_not_all_is_told_of_a_loop_t
     monkeypatch.setattr("firable.analysis.check.FIRST_MARKINGS", 200)
     assert main(["check", CELL, "--machines", PLANT]) == 0
     assert "\n  the first 200 markings are not all\n" in capsys.readouterr().out
+
+
+@pytest.fixture
+def begun(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The nets that are explored beyond M0, of which Ctrl-C ends the second."""
+    nets: list[str] = []
+
+    def until_ctrl_c(net: Net, discipline: Discipline, budget: Budget, **by: Any) -> ReachabilityGraph:
+        if budget.markings == 1:
+            return explore(net, discipline, budget, **by)
+        nets.append(net.name)
+        if len(nets) == 2:
+            return ended(explore(net, discipline, replace(budget, markings=5), **by))
+        return explore(net, discipline, budget, **by)
+
+    monkeypatch.setattr("firable.analysis.check.explore", until_ctrl_c)
+    return nets
+
+
+def test_one_ctrl_c_ends_all_explorations_of_a_cell_with_its_machines(
+    begun: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["check", CELL, "--machines", PLANT]) == 3
+    assert len(begun) == 2, "of the loop, and of the net with gates free"
+    told = capsys.readouterr().out
+    assert "903 markings and 2,218 edges\n  5 markings with gates free so far\n" in told
+    assert "\n  interrupted\n" in told
+    assert "  deadlock-free                       unknown     proved\n" in told
+    assert "✓ proved    loop.deadlock-free" in told
+    for fault in ("fault.safe", "fault.MC", "fault.MC.repaired"):
+        told_of_it = (
+            rf"\? unknown   {fault} .*\n(?: .*\n)*? +reached: interrupted\n +hint: .*ask again, and let it come"
+        )
+        assert re.search(told_of_it, told), fault
+
+
+def test_one_ctrl_c_ends_all_explorations_for_a_bundle(
+    begun: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["bundle", CELL, "-o", str(tmp_path / "cell.bundle"), "--machines", PLANT]) == 3
+    assert len(begun) == 2, "of the net, and of the loop of commands that are sent late"
+    told = capsys.readouterr().out
+    assert "no bundle was made" in told
+    assert "? unknown   loop.deadlock-free" in told
+    assert "ask again, and let it come to its end" in told
+    assert "--max-seconds" not in told
 
 
 def test_a_bundle_that_is_kept_back_by_how_many_markings_are_written_down_is_not_told_to_take_more_time(
