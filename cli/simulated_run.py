@@ -28,7 +28,7 @@ def run_simulated_of(path: str, bundle: Bundle, cell: SimulatedCell, conduct: Co
     from firable.executor.operating.running import run_simulated
     from firable.nets.machines.plant_file import late_limits
 
-    for late in late_limits(cell.plant, bundle.net):  # before the run, which may go round for ever
+    for late in late_limits(cell.plant, bundle.net):  # before the run, which may go round in a circle
         text.show_diagnostic(late)
     with told_aside(_told, conduct.log) as tell:
         report = run_simulated(bundle, cell, replace(conduct, tell=partial(_if_not_reported, tell)))

@@ -11,7 +11,7 @@ A pure machine with its own queue of events: the caller says what time it is. Al
 from __future__ import annotations
 
 import random
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from heapq import heappop, heappush
 from typing import Final
@@ -149,6 +149,14 @@ class _FaultError(Exception):
     """A law of the plant is broken."""
 
 
+def _told_apart(workpiece: Workpiece | None) -> Hashable:
+    return workpiece and (workpiece.id, workpiece.processed)
+
+
+def _doing(busy: _Busy | None) -> Hashable:
+    return busy and (busy.command, busy.waits)
+
+
 class Plant:
     """The cell of a plant file at rest, into which `workpieces` workpieces will come."""
 
@@ -203,6 +211,17 @@ class Plant:
         """The workpieces in the cell, in the order in which they came."""
         holders = [*self.stations.values(), *(machine.holding for machine in self.machines.values())]
         return tuple(sorted(workpiece.id for workpiece in holders if workpiece is not None))
+
+    @property
+    def standing(self) -> Hashable:
+        """Where everything is and what the machines are at, whatever the time: equal where nothing has changed."""
+        machines = tuple(
+            (machine.position, _told_apart(machine.holding), _doing(machine.busy), _doing(machine.breaks_off))
+            for machine in self.machines.values()
+        )
+        stations = tuple(map(_told_apart, self.stations.values()))
+        looked = frozenset(self.found_good.items())
+        return machines, stations, frozenset(self.clamped), frozenset(self.pressed), looked, self.arrival_due
 
     def close(self) -> None:
         """Let no more workpieces come, until it is opened."""

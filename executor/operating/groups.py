@@ -152,6 +152,8 @@ class Groups:
             if acts.firings_at_once > FIRINGS_AT_ONCE_MAX:
                 last = acts.fired_at_once[0]
                 run.fail(f"'{last}' and others fire without end, and no time passes: no gate ever holds them")
+            if run.circling is not None:
+                run.circling.end_circle()
             self.are_due = False
             if self.storing is not None:
                 if acts.posted and not acts.is_ahead:

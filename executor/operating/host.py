@@ -33,6 +33,7 @@ from firable.executor.operating import ending, latch, lives, restart, stopping
 from firable.executor.operating.acquaintances import Acquaintances
 from firable.executor.operating.acts import Acts
 from firable.executor.operating.aside import UntoldError
+from firable.executor.operating.circling import Circling
 from firable.executor.operating.clock import RunClock
 from firable.executor.operating.coalesced import Coalesced
 from firable.executor.operating.conduct import UNATTENDED, Conduct, Watch
@@ -54,8 +55,9 @@ from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import Keep, Message, Sending
 from firable.nets.decomposition import Decomposition
 
-if TYPE_CHECKING:  # it needs the extra `serve`
-    from firable.executor.operating.metrics import Metrics
+if TYPE_CHECKING:
+    from firable.executor.cell.plant import Plant
+    from firable.executor.operating.metrics import Metrics  # it needs the extra `serve`
 
 _END: Final = "end"
 """Under which the journal keeps, beside the trace, that all the work of the run was done."""
@@ -77,6 +79,7 @@ class Host:
         speed: float = 1.0,
         begin_seconds: float = 0.0,
         is_complete: Callable[[], bool] = lambda: False,
+        cell: Plant | None = None,
         monitor: Monitor | LocalMonitor | None = None,
         figures: Metrics | None = None,
         patience: Patience | None = None,
@@ -106,7 +109,10 @@ class Host:
         self.watching = None if monitor is None else Watching(monitor, self._diverged)
         self.figures = figures
         self.log = conduct.log
-        recorder.observers += [one.seen for one in (self.watching, figures, self.log) if one is not None]
+        self.circling = None if cell is None else Circling(self, cell)
+        """Whether a run on this simulated cell goes round in a circle."""
+        observers = (self.watching, figures, self.log, self.circling)
+        recorder.observers += [one.seen for one in observers if one is not None]
         self.said = conduct.said
         """What the operator has said beforehand of commands, by place."""
         self.patience = patience or Patience()

@@ -163,6 +163,7 @@ def execute(
             conduct,
             speed=1.0 if cell.speed is None else cell.speed,
             is_complete=lambda: len(plant.delivered) == cell.workpieces,
+            cell=plant,
             journal=files.journal,
             begin_seconds=files.begin_seconds,
             monitor=None if conduct.watch is Watch.IGNORE else Monitor(net, cell.plant),

@@ -66,6 +66,12 @@ def fail(run: Host, message: str) -> None:
         run.tell_operator("fault", message)
 
 
+def end(run: Host, message: str) -> None:
+    """End a run that would not end by itself, with its machines stopped where they are, for this reason."""
+    run.ended_by = message
+    _end_soon(run, "stopped", message=message)
+
+
 def halt(run: Host, note: str, **data: str) -> None:
     """Let nothing fire by itself any more, and have the trace say why."""
     run.paused = run.acts.halted = True  # first, so that nothing fires whatever happens to the trace

@@ -1,0 +1,93 @@
+"""Whether a run on the simulated cell goes round in a circle: then virtual time would go on for ever and tell nothing.
+
+A place with a time limit that its machine never keeps is tried again and again, and no workpiece gets any further. What
+can be told apart of such a run is finite: the marking with its signals, and where everything in the cell is. Workpieces
+are told apart too, so one that comes, moves, is machined or leaves is always something new. When many firings on end
+have led to nothing that was not there before, more will not. Nothing is concluded as long as something is still to come
+that was under way when they began: a workpiece that arrives in an hour, a machine that takes long, another time limit.
+
+Rejected: to look for the very same moment, with all times in it. Where machines take now longer and now shorter it
+never comes again, and what the machines of the protocol remember would have to be compared as well. Rejected, too: so
+many seconds without a workpiece that moves. How long a cell may well wait only its plant file and its time limits know.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Hashable
+from typing import TYPE_CHECKING, Final
+
+from firable.executor.operating import stopping
+from firable.nets.verdict import counted
+from firable.semantics.trace import Event, Fired
+
+if TYPE_CHECKING:
+    from firable.executor.cell.plant import Plant
+    from firable.executor.operating.host import Host
+
+FIRINGS_MAX: Final = 5_000
+"""So many firings on end that lead to nothing new are a circle."""
+KNOWN_MAX: Final = 100_000
+"""So much is remembered of what was there; a circle that is larger is not noticed."""
+_TOLD_MAX: Final = 6
+
+
+class Circling:
+    """What a run of a whole cell comes to, firing by firing."""
+
+    def __init__(self, run: Host, cell: Plant) -> None:
+        self.run = run
+        self.cell = cell
+        self.known: set[int] = set()
+        """What was there since the last workpiece came or went, by its hash."""
+        self.through = (0, 0)
+        """How many workpieces had come and gone then."""
+        self.again: Counter[str] = Counter()
+        """What has fired since the last firing that led to something new."""
+        self.since_seconds = 0.0
+        self.was_to_come: set[Hashable] = set()
+        """What was to come then."""
+
+    def seen(self, event: Event) -> None:
+        """Take an event of the trace."""
+        if not isinstance(event, Fired):
+            return
+        through = (self.cell.entered, len(self.cell.delivered))
+        if through != self.through or len(self.known) >= KNOWN_MAX:
+            self.through = through
+            self.known.clear()
+        now = hash((self.run.recorder.word, self.cell.standing))
+        if now not in self.known:
+            self.known.add(now)
+            self.again.clear()
+            return
+        if not self.again:
+            self.since_seconds, self.was_to_come = event.at_seconds, set(self._to_come())
+        self.again.update(event.transitions)
+
+    def end_circle(self) -> None:
+        """End a run that goes round in a circle, unless an operator may change that; by a fault, if work is left."""
+        run = self.run
+        if self.again.total() < FIRINGS_MAX or run.operated or run.served or run.stopping:
+            return
+        if not self.was_to_come.isdisjoint(self._to_come()):
+            return
+        if run.is_complete():
+            stopping.end(run, f"all workpieces went through, and now {self._told()}")
+        else:
+            stopping.fail(run, f"{self._told()}, and brought no workpiece any further")
+
+    def _to_come(self) -> set[Hashable]:
+        """What will happen by itself, each by something that it does not share with its like of another time."""
+        happenings: set[Hashable] = {number for _, number, _ in self.cell.events}
+        # The alarm of a command is behind its time limit, so that it is to come as long as that is.
+        return happenings | {(awaited, alarm.when()) for awaited, alarm in self.run.dispatch.timers.items()}
+
+    def _told(self) -> str:
+        """The circle in a sentence."""
+        seconds = self.run.now_seconds() - self.since_seconds
+        names = sorted(self.again, key=self.run.net.transition_index.__getitem__)
+        some = names[:_TOLD_MAX] + [f"{len(names) - _TOLD_MAX} more"] * (len(names) > _TOLD_MAX)
+        around = " and ".join(filter(None, (", ".join(some[:-1]), some[-1])))
+        firings = counted(self.again.total(), "firing")
+        return f"the cell goes round in a circle of {around}: {firings} in {seconds:,.0f} s led to nothing new"
