@@ -32,6 +32,8 @@ from firable.nets.verdict import Cost
 DIAGRAM: Final = "decision diagram"
 _REDUCING_SHARE: Final = 0.75
 _WALKED_FIRST: Final = 2**18
+_WALKED_BESIDE: Final = 2**28
+"""Firings of walks, alone and beside the others, which may have given up before."""
 _ALONE_FIRST: Final = 2**12
 """Markings that stubborn sets search before a diagram is made beside."""
 
@@ -84,21 +86,21 @@ def decide_reduced(
 
 
 def decide_by_reduction(net: Net, goal: Formula, limits: Limits) -> Finding:
-    """Decide on the reduced net, by stubborn sets and by a decision diagram side by side, whichever is first.
+    """Decide on the reduced net, by stubborn sets, a decision diagram and random walks, whichever is first.
 
     Stubborn sets leave out orders of firing that the rules cannot; a diagram holds what is left of nets whose own is
-    too large.
+    too large; and walks come to a goal sooner than in the net itself, as a firing stands for many.
 
     >>> from firable.nets.catalogue import catalogue_net
     >>> from firable.nets.formula import Deadlock
     >>> decide_by_reduction(catalogue_net("one_robot_mc_late"), Deadlock(), Limits()).cost.markings
     4
     """
-    return decide_reduced(net, goal, limits, _by_both)
+    return decide_reduced(net, goal, limits, _by_all)
 
 
-def _by_both(net: Net, goal: Formula, limits: Limits) -> Finding:
-    """Few markings are searched by stubborn sets alone, which shows a shortest way; many, beside a diagram.
+def _by_all(net: Net, goal: Formula, limits: Limits) -> Finding:
+    """Few markings are searched by stubborn sets alone, which shows a shortest way; many, beside a diagram and walks.
 
     Between the two a short walk: what is left of a net is small, and often falls into a deadlock by itself.
     """
@@ -107,9 +109,13 @@ def _by_both(net: Net, goal: Formula, limits: Limits) -> Finding:
         first = decide_by_walk(net, goal, limits, firings=_WALKED_FIRST)
     if first.reachable is not None or limits.deadline.over:
         return first
-    deciders = (decide_by_stubborn_sets, decide_by_diagram)
-    lanes = [[Contestant(decide.__name__, partial(_decided, decide, net, goal))] for decide in deciders]
-    return race(lanes, limits, slices_seconds=None).answer or replace(first, bound="the time was over")
+    walk = partial(decide_by_walk, firings=_WALKED_BESIDE)
+    deciders = {"stubborn sets": decide_by_stubborn_sets, "diagram": decide_by_diagram, "walk": walk}
+    lanes = [[Contestant(name, partial(_decided, decide, net, goal))] for name, decide in deciders.items()]
+    of_two = replace(limits, memory_bytes=3 * limits.memory_bytes // 2)  # walks keep nothing, and are given a third
+    outcome = race(lanes, of_two, slices_seconds=None)
+    why = "the time was over" if limits.deadline.over else "; ".join(outcome.told)
+    return outcome.answer or replace(first, bound=why)
 
 
 def _decided(decide: Callable[[Net, Formula, Limits], Finding], net: Net, goal: Formula, limits: Limits) -> Finding:

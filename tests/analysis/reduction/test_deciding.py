@@ -18,6 +18,7 @@ from firable.analysis.check import check
 from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.certificate import InductiveInvariant
 from firable.analysis.goal import Finding, Limits
+from firable.analysis.reduction import deciding
 from firable.analysis.reduction.components import parts
 from firable.analysis.reduction.deciding import (
     decide_by_diagram,
@@ -169,6 +170,19 @@ def test_stubborn_sets_on_the_reduced_net_find_a_deadlock_exactly_if_there_is_on
     found = decide_by_reduction(net, Deadlock(), Limits())
     assert found.reachable is by_playing(net, Deadlock(), Limits()).reachable
     assert (found.witness is not None) is found.reachable
+
+
+def test_walks_go_on_beside_what_has_no_room_and_all_that_gave_up_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    net, small = philosophers(60), Limits(memory_bytes=1 << 18)
+    monkeypatch.setattr(deciding, "_WALKED_FIRST", 0)
+    found = decide_by_reduction(net, Deadlock(), small)
+    assert found.reachable
+    assert found.method.startswith("random walk, after reduction")
+    monkeypatch.setattr(deciding, "_WALKED_BESIDE", 3)
+    left = decide_by_reduction(net, Deadlock(), small)
+    assert left.reachable is None
+    for name in ("stubborn sets", "diagram", "walk"):
+        assert f"{name} gave up: " in left.bound
 
 
 def test_a_certificate_for_the_reduced_net_is_none_for_the_original() -> None:

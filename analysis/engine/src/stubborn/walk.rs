@@ -5,7 +5,8 @@
 //! are false is counted, and only the needers of what was flipped are looked at, whatever the size of the net. Every
 //! fourth walk is blind; every fourth draws a few transitions and fires the one that was fired least; every fourth
 //! the one after which the goal is nearest (literals that still have to become true; firable transitions, for a
-//! deadlock); and every fourth follows relaxed plans, which see what has to happen long before. The lengths follow the
+//! deadlock); and every fourth follows relaxed plans, which see what has to happen long before. To fire what was fired
+//! least keeps a net going, so those that look for a deadlock are blind in its place. The lengths follow the
 //! sequence of Luby, Sinclair and Zuckerman ("Optimal speedup of Las Vegas algorithms", 1993), which is within a
 //! logarithm of the best choice of restarts, whatever that is.
 //!
@@ -79,8 +80,10 @@ fn find(
     let mut path = Vec::new();
     let unit = UNIT.max(count.min(LENGTH_MAX / 64));
     let mut plan = Plan::new(dependencies, net.places, count);
+    let evenly = if matches!(target, Target::Deadlock) { Guide::Blind } else { Guide::LeastFired };
+    let guides = [evenly, Guide::Nearest, Guide::Blind, Guide::Planned];
     for round in 1_u64.. {
-        let guide = [Guide::LeastFired, Guide::Nearest, Guide::Blind, Guide::Planned][round as usize % 4];
+        let guide = guides[round as usize % guides.len()];
         let length = LENGTH_MAX.min(unit.saturating_mul(luby(round.div_ceil(4)) as usize));
         let mut walker = Walker::new(dependencies, &net.initial, count);
         watch.tick(count)?;
