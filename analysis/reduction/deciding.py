@@ -109,8 +109,11 @@ def _by_all(net: Net, goal: Formula, limits: Limits) -> Finding:
         first = decide_by_walk(net, goal, limits, firings=_WALKED_FIRST)
     if first.reachable is not None or limits.deadline.over:
         return first
-    walk = partial(decide_by_walk, firings=_WALKED_BESIDE)
-    deciders = {"stubborn sets": decide_by_stubborn_sets, "diagram": decide_by_diagram, "walk": walk}
+    deciders: dict[str, Callable[[Net, Formula, Limits], Finding]] = {
+        "stubborn sets": decide_by_stubborn_sets,
+        "diagram": decide_by_diagram,
+        "walk": partial(decide_by_walk, firings=_WALKED_BESIDE),
+    }
     lanes = [[Contestant(name, partial(_decided, decide, net, goal))] for name, decide in deciders.items()]
     of_two = replace(limits, memory_bytes=3 * limits.memory_bytes // 2)  # walks keep nothing, and are given a third
     outcome = race(lanes, of_two, slices_seconds=None)
