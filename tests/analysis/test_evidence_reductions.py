@@ -91,7 +91,18 @@ WRONG: dict[str, tuple[Net, str, tuple[str, ...]]] = {
     "the goal speaks of what no move needs": (net_of("a z", "t: a -> b"), "z", ("unneeded z",)),
     "a move needs the place": (net_of("a", "t: a -> b", "u: b -> c"), "c", ("unneeded b",)),
     "copies are not flipped together": (net_of("a", "t: a -> b, c", "u: b -> "), "c and not b", ("copy b c",)),
+    "copies are flipped by a move that reads the other": (
+        net_of("a", "t: a -> b, c", "u: b -> if c"),
+        "c and not b",
+        ("copy b c",),
+    ),
+    "copies are read by a move that flips the other": (
+        net_of("a", "t: a -> b, c", "u: c -> if b"),
+        "b and not c",
+        ("copy b c",),
+    ),
     "who subsumes does something else": (net_of("a", "t: a -> b", "u: a -> c"), "c", ("subsumed 1 0",)),
+    "who subsumes does more": (net_of("a c", "t: a, c -> b", "u: a -> b if c"), "b and c", ("subsumed 1 0",)),
     "who subsumes takes less": (net_of("a b", "t: a -> ", "u: a, b -> "), "not a and not b", ("subsumed 1 0",)),
     "who subsumes needs more": (net_of("a", "t: a -> b", "u: a -> b if k"), "b", ("subsumed 0 1",)),
     "early is not possible yet": (net_of("a", "t: a -> b", "u: b -> c"), "a and not b", ("early 1",)),
@@ -109,6 +120,7 @@ WRONG: dict[str, tuple[Net, str, tuple[str, ...]]] = {
     "no fact implies the place": (net_of("a", "t: a -> b", "u: b -> c"), "c", ("facts", "implied b")),
     "the goal speaks of an implied place": (net_of("a", "t: a -> b, c"), "c", ("facts", "implied c")),
     "it cannot always be made": (net_of("a", "t: a -> b"), "deadlock", ("always 0",)),
+    "what changes nothing cannot always be made": (net_of("a", "t: -> if a", "u: a -> "), "deadlock", ("always 0",)),
     "the goal speaks of the place around which it is composed": (
         net_of("a", "h: a -> p", "f: p -> b"),
         "p",
@@ -118,6 +130,11 @@ WRONG: dict[str, tuple[Net, str, tuple[str, ...]]] = {
     "a place is read": (net_of("a", "h: a -> p", "f: p -> b", "r: -> c if p"), "c", ("facts", "openers-late p")),
     "a closer waits for something": (
         net_of("a", "h: a -> p", "f: p -> b if k", "u: -> k unless a", "v: k -> "),
+        "b and k",
+        ("facts", "closers-early p"),
+    ),
+    "a closer waits for something that stands before it": (
+        net_of("a", "u: -> k unless a", "v: k -> ", "h: a -> p", "f: p -> b if k"),
         "b and k",
         ("facts", "closers-early p"),
     ),
@@ -143,6 +160,11 @@ WRONG: dict[str, tuple[Net, str, tuple[str, ...]]] = {
     ),
     "a late opener finds changed what it reads": (
         net_of("a y", "h: a -> p if y", "f: p -> b if z", "u: y -> z"),
+        "b",
+        ("facts", "openers-late p"),
+    ),
+    "a late opener finds changed what it reads, of several places": (
+        net_of("a x y", "h: a -> p if y", "f: p -> b if z", "u: y -> z", "v: x -> "),
         "b",
         ("facts", "openers-late p"),
     ),
