@@ -69,7 +69,7 @@ def facts_of(initial: Mapping[int, bool], moves: Iterable[Move], known: Facts | 
             beside: npt.NDArray[np.bool_] = np.logical_and.reduce(together[move.needs])
             if not beside[move.needs].all():
                 continue
-            beside[move.own] = False
+            beside[move.needs] = False
             beside[move.after] = True
             now += 1
             for made in move.made:
@@ -91,7 +91,6 @@ class _Rows:
     def __init__(self, move: Move, rows: Mapping[Literal, int]) -> None:
         needs, flips = move
         self.needs = np.array([rows[literal] for literal in needs.items()], dtype=np.intp)
-        self.own = np.concatenate([self.needs, self.needs ^ 1])
         self.after = np.array([rows[p, value ^ (p in flips)] for p, value in needs.items()], dtype=np.intp)
         self.made = [rows[p, not needs[p]] for p in flips]
         self.looked = 0
