@@ -51,7 +51,7 @@ from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.analysis.evidence.document import document_from_text
 from firable.analysis.evidence.refusal import TimeIsOverError
 from firable.nets.diagnostics import InputError
-from firable.nets.formula import Constant, Holds, Not, Start, parse_formula
+from firable.nets.formula import And, Constant, Holds, Not, Start, parse_formula
 from firable.nets.net import ExternalGate, Fairness, Net, Place, Signal, Transition
 from firable.nets.temporal import parse_temporal
 from firable.semantics.trace import Discipline
@@ -311,7 +311,20 @@ RUNS: dict[str, Callable[[], Evidence]] = {
 
 ONE_TOKEN = InductiveInvariant((Equation((("a", 1), ("b", 1), ("c", 1)), 1),))
 UNMARKED = net("unmarked", "", ("a", "b"), ("b", "a"))
-DEAD_END = net("end", "ac", ("a", "b"), ("b", "a"), ("ac", "d"))
+RING = net("ring", "a", ("a", "b"), ("b", "a"))
+DRAWN = net("drawn", "a", ("a", "b"), ("b", "a"), ("a", "a"))
+# b and d exclude each other, each entered only beside the other's first place, so that `both` is dead.
+APART = Net(
+    "apart",
+    (Place("a", marked=True), Place("b"), Place("c", marked=True), Place("d")),
+    (
+        Transition("t0", ("a",), ("b",), ("c",)),
+        Transition("t1", ("b",), ("a",)),
+        Transition("t2", ("c",), ("d",), ("a",)),
+        Transition("t3", ("d",), ("c",)),
+        Transition("both", (), (), ("b", "d")),
+    ),
+)
 STARTED = net("started", "s", ("s", "a"), ("a", "b"), ("b", "a"))
 GATED = Net(
     "gated",
@@ -347,7 +360,18 @@ THEOREMS: dict[str, Callable[[], Evidence]] = {
     "a trap that is none": lambda: theorem(HALF_LIVE, TheoremName.FREE_CHOICE, ONE_TOKEN, "ab"),
     "a trap without a token": lambda: theorem(UNMARKED, TheoremName.FREE_CHOICE, NO_TOKEN, "ab"),
     "an empty trap": lambda: theorem(STARTED, TheoremName.FREE_CHOICE, THREE, "abs", claim=HOME_AGAIN),
-    "not free choice": lambda: theorem(DEAD_END, TheoremName.FREE_CHOICE, NO_CONTACT, "ab", "cd"),
+    "not free choice": lambda: theorem(APART, TheoremName.FREE_CHOICE, NO_CONTACT, "ab", "cd"),
+    "not asymmetric choice": lambda: theorem(APART, TheoremName.ASYMMETRIC_CHOICE, NO_CONTACT, "ab", "cd"),
+    "a transition that puts what it takes": lambda: theorem(DRAWN, TheoremName.FREE_CHOICE, ONE_OF_TWO, "ab"),
+    "another kind of claim": lambda: theorem(
+        RING, TheoremName.MARKED_GRAPH, ONE_OF_TWO, claim=Claim(ClaimKind.NEVER, Holds("b"))
+    ),
+    "another marking than M0": lambda: theorem(
+        RING,
+        TheoremName.MARKED_GRAPH,
+        ONE_OF_TWO,
+        claim=Claim(ClaimKind.ALWAYS_POSSIBLE, And((Holds("a"), Holds("b")))),
+    ),
     "a transition that never opens": lambda: theorem(SHUT, TheoremName.MARKED_GRAPH, ONE_OF_TWO),
     "gates": lambda: theorem(GATED, TheoremName.MARKED_GRAPH, ONE_OF_TWO),
     "contact": lambda: theorem(TRAPPED, TheoremName.FREE_CHOICE, InductiveInvariant(), "abc"),
@@ -398,6 +422,12 @@ def test_two_helpers_in_one_rank_are_refused() -> None:
     text = document(Evidence(TURNS, Discipline.INTERLEAVING, evidence.claim, doubled)).to_text()
     with pytest.raises(InputError, match="F6001"):
         document_from_text(text)
+
+
+def test_a_theorem_of_asymmetric_choice_says_nothing_of_home_markings() -> None:
+    evidence = theorem(CHOICE, TheoremName.ASYMMETRIC_CHOICE, ONE_TOKEN, "abc")
+    assert not refused(evidence)
+    assert refused(replace(evidence, claim=HOME_AGAIN))
 
 
 def test_a_theorem_says_nothing_of_steps() -> None:
