@@ -102,6 +102,9 @@ LABELS: dict[str, Callable[[], Evidence]] = {
     "a rank too few": lambda: listed(LOOP, "EF z", ["a", "b"], 0),
     "a diagram leaves M0 out": lambda: of_loop(Whole(), "AG b", "b", ENDING),
     "nothing is said of M0": lambda: never(ENDING, "a", Diagram(("a", "b"), ((2, 0, 1),), (2,))),
+    "a diagram's row holds nothing": lambda: never(
+        LOOP, "b or z", Diagram(("a", "z", "b"), ((1, 0, 1), (3, 1, 0), (3, 2, 3)), (4,))
+    ),
     "a diagram is left": lambda: of_loop(Whole(), "AG a", "a"),
     "a diagram's whole does not hold": lambda: of_loop(Whole(), "AG a"),
     "a diagram's part is left": lambda: of_loop(Root(1), "EG a"),

@@ -62,6 +62,8 @@ class Diagrams(Nodes):
             if not below or max(self.levels[numbers[lo]], self.levels[numbers[hi]]) >= level:
                 refuse("a row of the diagram does not stand above its parts")
             numbers.append(self.node(level, numbers[lo], numbers[hi]))
+            if self.levels[numbers[-1]] != level:  # it is what is below it, which who reads rows alone would miss
+                refuse("a row of the diagram holds nothing with a token at its level")
         if not of.roots or not all(0 <= root < len(numbers) for root in of.roots):
             refuse("the diagram has no such root")
         self.n_nodes = len(self.levels) - 2
