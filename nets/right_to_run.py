@@ -14,12 +14,13 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
+from firable.nets.deciding import deciders, groups, owners
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.evidence_names import named_as_proved
 from firable.nets.free_parts import unfounded
 from firable.nets.joining import join
 from firable.nets.layers import Layers
-from firable.nets.net import Net, Transition
+from firable.nets.net import Net
 from firable.nets.verdict import Verdict, Weight
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ def required_verdicts(decomposition: Decomposition) -> Iterator[str]:
     yield from required_of_the_net(net)
     yield from (f"{equation}.{t.name}" for t in net.transitions for equation in ("eq7", "eq8", "o3"))
     yield from (f"eq9-10.{place.name}" for place in net.places)
-    yield from (f"o2.{t.name}" for t in net.transitions if len(_owners(net, t)) > 1)
+    yield from (f"o2.{t.name}" for t in net.transitions if len(owners(net, t)) > 1)
     yield from (
         f"o2.{place.name}"
         for p, place in enumerate(net.places)
@@ -68,17 +69,11 @@ def required_verdicts(decomposition: Decomposition) -> Iterator[str]:
     )
     if Layers(net).several:
         yield "o8"
-        yield from (f"o8.{t.name}" for t in net.transitions if len(_owners(net, t)) > 1)
+        yield from (f"o8.{t.name}" for t in net.transitions if len(owners(net, t)) > 1)
         yield "o8-apart"
     yield from ("ownership", "initial-marking", "commands", "arbitration")
     yield from (f"arbitration.{group.name}" for group in decomposition.groups)
     yield from PROTOCOL
-
-
-def _owners(net: Net, transition: Transition) -> set[str | None]:
-    """The owners of everything that a transition touches."""
-    places = (*transition.inputs, *transition.outputs, *transition.permissive, *transition.inhibitive)
-    return {net.place(name).owner for name in places} | {net.signal(g.signal).owner for g in transition.external}
 
 
 def required_of_the_net(net: Net) -> Iterator[str]:
@@ -92,8 +87,9 @@ def unproved(bundle: Bundle) -> tuple[Diagnostic, ...]:
 
     Required is what the net requires, and whatever else a verdict of the bundle says that it does. Verdicts on the net
     must be on interleaving, by which it is executed, and a document of evidence must have a record on each; obligations
-    must bring what another solver can check; and the subnets must join into the very net. Parts free of promise must
-    disturb nobody, and their votes be proved persistent (`firable.nets.free_parts`).
+    must bring what another solver can check; the subnets must join into the very net, and the table decide what that
+    net makes of it (`firable.nets.deciding`). Parts free of promise must disturb nobody, and their votes be proved
+    persistent (`firable.nets.free_parts`).
     """
     problems = []
     on_the_net = set(required_of_the_net(bundle.net))
@@ -135,7 +131,9 @@ def unproved(bundle: Bundle) -> tuple[Diagnostic, ...]:
     if not joins:
         message = "the subnets do not make the net together, of which the verdicts are"
         problems.append(Diagnostic("F5002", message, _REMEDY, ("subnets",)))
-    return (*problems, *_undecided_conflicts(bundle.decomposition))
+    else:
+        problems += list(_undecided_conflicts(bundle.decomposition)) or _decided_otherwise(bundle.decomposition)
+    return tuple(problems)
 
 
 def _documents(bundle: Bundle, files: set[str]) -> dict[str, frozenset[str]]:
@@ -171,3 +169,14 @@ def _undecided_conflicts(decomposition: Decomposition) -> Iterator[Diagnostic]:
             if len(together) > 1 and (None in deciders or len(deciders) > 1):
                 message = f"the conflict at '{place.name}' is not decided by one arbitration group"
                 yield Diagnostic("F5002", message, _REMEDY, ("places", place.name))
+
+
+def _decided_otherwise(decomposition: Decomposition) -> Iterator[Diagnostic]:
+    """What the table decides otherwise than the net makes it: by another coordinator, or in another order."""
+    net = decomposition.net
+    at = deciders(net)
+    if {row.name: row.at for row in decomposition.coordinated} != at:
+        yield Diagnostic("F5002", "the coordinators of the table are not those of the net", _REMEDY, ("table",))
+    elif decomposition.groups != tuple(groups(net, at)):
+        message = "the arbitration groups of the table do not decide as those of the net"
+        yield Diagnostic("F5002", message, _REMEDY, ("table",))

@@ -20,7 +20,17 @@ from firable.nets.decomposition import ArbitrationGroup, Coordinated, Decomposit
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import Holds
 from firable.nets.interchange import canonical_json
-from firable.nets.net import ArbitrationRule, Command, Controller, Net, Place, Property, PropertyKind, Transition
+from firable.nets.net import (
+    Arbiter,
+    ArbitrationRule,
+    Command,
+    Controller,
+    Net,
+    Place,
+    Property,
+    PropertyKind,
+    Transition,
+)
 from firable.nets.right_to_run import CHECKED, PROTOCOL, required_verdicts, unproved
 from firable.nets.verdict import Cost, Cure, Status, Verdict, Wait, Weight, Witness
 
@@ -35,6 +45,7 @@ NET = Net(
     (P, Q, R),
     (Transition("G", ("a.p",), ("b.q",), number=1), Transition("l", ("a.p",), ("a.r",))),
     controllers=(A, B),
+    arbiters=(Arbiter("next", ("l", "G")),),
     properties=(Property("apart", PropertyKind.NEVER, Holds("b.q")),),
 )
 DECOMPOSITION = Decomposition(
@@ -415,3 +426,26 @@ def test_conflict_that_no_group_decides_may_not_run() -> None:
     apart = tuple(ArbitrationGroup(f"g{i}", (t,), (), ArbitrationRule.PRIORITY) for i, t in enumerate("Gl"))
     found = unproved(replace(BUNDLE, decomposition=replace(DECOMPOSITION, groups=apart)))
     assert ("places", "a.p") in {d.subject for d in found}
+
+
+(GROUP,), (ROW, LOCAL) = DECOMPOSITION.groups, DECOMPOSITION.coordinated
+OTHERWISE = (
+    *(replace(GROUP, controller=name) for name in ("a", "b", "nobody")),
+    *(replace(GROUP, at=name) for name in ("a", "b", "nobody")),
+    replace(GROUP, by=ArbitrationRule.ROTATION),
+    *(replace(GROUP, sequence=tuple(order)) for order in ("Gl", "lGl")),
+    replace(GROUP, sequence=("l",), rest=("G",)),
+    replace(GROUP, rest=("nothing",)),
+)
+
+
+@pytest.mark.parametrize(
+    "edited",
+    [
+        *(replace(DECOMPOSITION, groups=(group,)) for group in OTHERWISE),
+        replace(DECOMPOSITION, groups=(GROUP, GROUP)),
+        *(replace(DECOMPOSITION, coordinated=(replace(ROW, at=name), LOCAL)) for name in ("a", "b", "nobody")),
+    ],
+)
+def test_table_that_decides_otherwise_than_the_net_may_not_run(edited: Decomposition) -> None:
+    assert [(d.code, d.subject) for d in unproved(replace(BUNDLE, decomposition=edited))] == [("F5002", ("table",))]
