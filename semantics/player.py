@@ -10,7 +10,7 @@ valuation fire together, as far as they do not conflict; which maximal set is th
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from firable.nets.net import Marking, Net
@@ -31,9 +31,16 @@ class NotFirableError(ValueError):
     """A transition was told to fire where the firing rule forbids it."""
 
 
+def _no_hurry() -> None:
+    """Nobody waits."""
+
+
 @dataclass(frozen=True)
 class Player:
     """Plays the tokens of one net; markings are arguments and results, nothing is remembered.
+
+    `tick` is called again and again by what may take exponentially long, the steps of a marking: whoever cannot wait
+    raises there.
 
     >>> from firable.nets.net import Net, Place, Transition
     >>> net = Net("n", (Place("p", marked=True), Place("q")), (Transition("t", ("p",), ("q",)),))
@@ -43,6 +50,7 @@ class Player:
     """
 
     net: Net
+    tick: Callable[[], object] = field(default=_no_hurry, repr=False, compare=False)
 
     @cached_property
     def conflicts(self) -> Conflicts:
@@ -106,6 +114,7 @@ class Player:
         names = sorted({gate.signal for t in candidates for gate in self.net.transitions[t].external})
         found = set()
         for bits in range(1 << len(names)):
+            self.tick()
             valuation = {self.net.signal_index[name]: bool(bits >> i & 1) for i, name in enumerate(names)}
             found.add(tuple(t for t in candidates if external_gates(BOOL, self.net, t, valuation.__getitem__)))
         return found
@@ -115,6 +124,7 @@ class Player:
         found: set[FiringSet] = set()
         todo = [(frozenset[int](), frozenset(enabled_transitions), frozenset[int]())]
         while todo:  # Bron and Kerbosch's enumeration of maximal independent sets
+            self.tick()
             chosen, candidates, excluded = todo.pop()
             if not candidates:
                 if not excluded:
@@ -152,7 +162,7 @@ class Player:
             for t in candidates
             if t not in chosen and not self.conflicts.rivals[t] & chosen
         ]
-        return _satisfiable(to_close, valuation)
+        return self._satisfiable(to_close, valuation)
 
     def successors(self, marking: Marking, *, step: bool = False) -> Iterator[tuple[FiringSet, Marking]]:
         """What may fire, and the marking after it, under either discipline."""
@@ -198,11 +208,12 @@ class Player:
     def _shown(self, marking: Marking) -> str:
         return "{" + ", ".join(self.net.names(marking)) + "}"
 
-
-def _satisfiable(clauses: list[tuple[tuple[str, bool], ...]], valuation: dict[str, bool]) -> bool:
-    """Whether a valuation that extends the given one makes a literal of every clause true."""
-    unmet = [c for c in clauses if not any(valuation.get(signal) is value for signal, value in c)]
-    if not unmet:
-        return True
-    clause = min(unmet, key=len)
-    return any(_satisfiable(unmet, {**valuation, signal: value}) for signal, value in clause if signal not in valuation)
+    def _satisfiable(self, clauses: list[tuple[tuple[str, bool], ...]], valuation: dict[str, bool]) -> bool:
+        """Whether a valuation that extends the given one makes a literal of every clause true."""
+        self.tick()
+        unmet = [c for c in clauses if not any(valuation.get(signal) is value for signal, value in c)]
+        if not unmet:
+            return True
+        clause = min(unmet, key=len)
+        more = ({**valuation, signal: value} for signal, value in clause if signal not in valuation)
+        return any(self._satisfiable(unmet, one) for one in more)

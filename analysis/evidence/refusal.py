@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import NoReturn, TypeVar
 
 from firable.analysis.deadline import Deadline
@@ -17,6 +17,16 @@ class TimeIsOverError(Exception):
 
     def __init__(self, reason: str = "the time was over") -> None:
         super().__init__(reason)
+
+
+def ticking(deadline: Deadline) -> Callable[[], None]:
+    """What raises `TimeIsOverError` once there is no more time."""
+
+    def tick() -> None:
+        if deadline.over:
+            raise TimeIsOverError
+
+    return tick
 
 
 def in_time(of: Iterable[T], deadline: Deadline) -> Iterator[T]:

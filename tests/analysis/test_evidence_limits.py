@@ -16,10 +16,14 @@ from firable.analysis.evidence.certificate import (
     Certificate,
     Diagram,
     Equation,
+    FiringSequence,
     InductiveInvariant,
     Inequality,
     Labelling,
     Markings,
+    Reduction,
+    Rule,
+    Step,
     Unfolded,
 )
 from firable.analysis.evidence.checking.checker import check_document, check_evidence
@@ -45,7 +49,7 @@ from firable.nets.catalogue import catalogue_net
 from firable.nets.catalogue.families import family_net
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import And, Holds
-from firable.nets.net import Command, Net, Place, Transition
+from firable.nets.net import Command, ExternalGate, Net, Place, Signal, Transition
 from firable.nets.queries import parse_query
 from firable.nets.temporal import parse_temporal
 from firable.semantics.firing import firable
@@ -378,3 +382,40 @@ def test_what_asks_a_space_out_of_its_budget_beside_its_claims_is_lacking(
     net = Net("turns", places, (Transition("go", ("p0",), ("p1",)), Transition("back", ("p1",), ("p0",))))
     lacking = {record.name: record.lacking for record in evidence_of_report(check(net)).records if record.lacking}
     assert lacking == {"machine-never-stopped": why}
+
+
+def in_stages(n_places: int, n_ways: int) -> Evidence:
+    """From each place to the next there are many ways, and a reduction composes all of them with each other."""
+    names = [f"p{i}" for i in range(n_places)]
+    ways = ((i, k) for i in range(n_places - 1) for k in range(n_ways))
+    places = tuple(Place(name, marked=name == "p0") for name in names)
+    of = Net("stages", places, tuple(Transition(f"t{i}-{k}", (names[i],), (names[i + 1],)) for i, k in ways))
+    steps = tuple(Step(Rule.OPENERS_LATE, places=(name,)) for name in names[1:-1])
+    return Evidence(of, Discipline.INTERLEAVING, Claim(ClaimKind.NEVER, Holds(names[-1])), Reduction(steps))
+
+
+def with_signals(n_signals: int) -> Evidence:
+    """Who fires depends on signals of which each may be 0 or 1."""
+    signals = tuple(Signal(f"s{i}") for i in range(n_signals))
+    ways = tuple(Transition(f"t{i}", ("a",), ("b",), external=(ExternalGate(f"s{i}"),)) for i in range(n_signals))
+    of = Net("signals", (Place("a", marked=True), Place("b")), ways, signals)
+    claim = Claim(ClaimKind.NEVER, And((Holds("a"), Holds("b"))))
+    return Evidence(of, Discipline.STEP, claim, Labelling(Markings((1, 2))))
+
+
+def with_clauses(n_signals: int) -> Evidence:
+    """Whether one transition is a step alone is whether clauses of three literals can be true together."""
+    of, n_clauses = random.Random(3), 5 * n_signals
+    places = [Place("a", marked=True), Place("b")]
+    transitions = [Transition("t", ("a",), ("b",))]
+    for i in range(n_clauses):
+        gates = (ExternalGate(f"s{k}", wanted=of.random() < 0.5) for k in of.sample(range(n_signals), 3))
+        places += [Place(f"c{i}", marked=True), Place(f"d{i}")]
+        transitions.append(Transition(f"u{i}", (f"c{i}",), (f"d{i}",), external=tuple(gates)))
+    net = Net("clauses", tuple(places), tuple(transitions), tuple(Signal(f"s{i}") for i in range(n_signals)))
+    return Evidence(net, Discipline.STEP, Claim(ClaimKind.REACHABLE, Holds("b")), FiringSequence((("t",),)))
+
+
+@pytest.mark.parametrize("evidence", [in_stages(5, 20), with_signals(18), with_clauses(24)], ids=lambda of: of.net.name)
+def test_what_a_small_document_makes_a_checker_do_ends_in_time(evidence: Evidence) -> None:
+    assert check_evidence(evidence, timeout_ms=100).shown is None

@@ -198,7 +198,7 @@ class _Checker:
         net, discipline, claim = evidence.net, evidence.discipline, evidence.claim
         match certificate:
             case FiringSequence():
-                return _run(evidence, certificate)
+                return _run(evidence, certificate, self.deadline)
             case InductiveInvariant():
                 return self._discharged(evidence)
             case Labelling(space, labels):
@@ -219,7 +219,7 @@ class _Checker:
                 rest = self.check(left.rest)
                 return replace(rest, method=f"{left.words}, and of what is left: {rest.method}")
             case Continuation(firings):
-                rest = self.check(continued(evidence))
+                rest = self.check(continued(evidence, self.deadline))
                 return replace(rest, method=f"{counted(len(firings), 'firing')} played, and from there: {rest.method}")
             case Progress(space):
                 listed = self._listed(evidence, space)
@@ -356,25 +356,25 @@ def _true(assignment: object, name: str) -> bool:
     return isinstance(assignment, dict) and bool(assignment.get(name, assignment.get(f"{name}@0")))
 
 
-def _run(evidence: Evidence, of: FiringSequence) -> Checked:
+def _run(evidence: Evidence, of: FiringSequence, deadline: Deadline) -> Checked:
     net, discipline, claim = evidence.net, evidence.discipline, evidence.claim
     method = f"{counted(len(of.firings) + len(of.cycle), 'firing')} played by the reference player"
     match claim.kind:
         case ClaimKind.NOT_LTL:
-            check_refuting_run(net, discipline, claim, of)
+            check_refuting_run(net, discipline, claim, of, deadline)
             return Checked(shown=True, method=f"{method}, and the formula evaluated along them")
         case ClaimKind.NOT_LEADS_TO:
-            check_unanswered_run(net, discipline, claim, of)
+            check_unanswered_run(net, discipline, claim, of, deadline)
             return Checked(shown=True, method=f"{method}, a run that is fair and has no answer")
     if claim.kind is ClaimKind.UNORDERED:
-        played(net, discipline, of.firings)
+        played(net, discipline, of.firings, deadline)
         last = [net.transition_index[name] for name in of.firings[-1]] if of.firings else []
         if Player(net).serialisable(last):
             refuse("the last step of the run can be replayed one firing after the other")
         return Checked(shown=True, method=f"{method}, the last of which have no order")
     if of.cycle:
         refuse("a run into a marking has no cycle")
-    markings = played(net, discipline, of.firings)
+    markings = played(net, discipline, of.firings, deadline)
     if claim.kind is ClaimKind.REACHABLE:
         if not holds(net, claim.state_goal, markings[-1]):
             refuse(f"after the firings ({format_formula(claim.state_goal)}) does not hold")

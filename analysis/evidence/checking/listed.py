@@ -12,7 +12,7 @@ from functools import cached_property
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.certificate import Label, Ranks, Whole
 from firable.analysis.evidence.checking.columns import columns
-from firable.analysis.evidence.refusal import TimeIsOverError, refuse, shown
+from firable.analysis.evidence.refusal import TimeIsOverError, refuse, shown, ticking
 from firable.nets.formula import Formula
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import counted
@@ -37,7 +37,7 @@ class Part:
         self, net: Net, discipline: Discipline, markings: Sequence[Marking], deadline: Deadline = NEVER
     ) -> None:
         self.net, self.discipline, self.markings = net, discipline, markings
-        self.player = Player(net)
+        self.player = Player(net, ticking(deadline))
         self._changed: dict[int, Marking] = {}
         places = {marking: i for i, marking in enumerate(markings)}
         if net.initial_marking not in places:

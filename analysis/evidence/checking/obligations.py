@@ -47,7 +47,7 @@ from firable.analysis.evidence.checking.reduced import left_of
 from firable.analysis.evidence.checking.siphons import of_siphons
 from firable.analysis.evidence.claims import Claim, ClaimKind, without_start
 from firable.analysis.evidence.meaning import contact
-from firable.analysis.evidence.refusal import TimeIsOverError, refuse
+from firable.analysis.evidence.refusal import TimeIsOverError, refuse, ticking
 from firable.analysis.induction.encoding import Relation, interleaving_relation, marking_term, step_relation
 from firable.analysis.induction.smt import Operator, Term, Terms, subterms
 from firable.nets.net import Marking, Net, holding
@@ -79,7 +79,7 @@ def obligations(evidence: Evidence, deadline: Deadline = NEVER, *, closed: bool 
             rest = () if left.rest is None else obligations(left.rest, deadline)
             return (*left.obligations, *rest)
         case Continuation():
-            return obligations(continued(evidence), deadline, closed=closed)
+            return obligations(continued(evidence, deadline), deadline, closed=closed)
         case Theorem() as theorem:
             siphons = of_siphons(evidence.net, theorem, TimedTerms(deadline=deadline))
             return (*obligations(contact_free(evidence), deadline), *siphons)
@@ -87,20 +87,25 @@ def obligations(evidence: Evidence, deadline: Deadline = NEVER, *, closed: bool 
             return ()
 
 
-def continued(evidence: Evidence) -> Evidence:
+def continued(evidence: Evidence, deadline: Deadline = NEVER) -> Evidence:
     """What a continuation shows of the net that starts where its firings end; refused where they cannot be fired."""
     certificate, net = evidence.certificate, evidence.net
     if not isinstance(certificate, Continuation):
         raise TypeError("the evidence is no continuation")
-    marking = played(net, evidence.discipline, certificate.firings)[-1]
+    marking = played(net, evidence.discipline, certificate.firings, deadline)[-1]
     claim = Claim(ClaimKind.NEVER, without_start(net, evidence.claim.state_goal))
     there = replace(net, places=holding(net.places, marking), properties=())
     return Evidence(there, evidence.discipline, claim, certificate.then)
 
 
-def played(net: Net, discipline: Discipline, firings: Iterable[Iterable[str]]) -> list[Marking]:
-    """The markings of a firing sequence, M0 first; refused where the reference player cannot fire it."""
-    player, markings = Player(net), [net.initial_marking]
+def played(
+    net: Net, discipline: Discipline, firings: Iterable[Iterable[str]], deadline: Deadline = NEVER
+) -> list[Marking]:
+    """The markings of a firing sequence, M0 first; refused where the reference player cannot fire it.
+
+    Raises `TimeIsOverError` at the deadline: whether a set is a step may be a hard question.
+    """
+    player, markings = Player(net, ticking(deadline)), [net.initial_marking]
     for number, names in enumerate(firings, start=1):
         fired = tuple(net.transition_index[name] for name in names)
         if discipline is Discipline.INTERLEAVING:

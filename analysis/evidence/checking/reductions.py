@@ -75,7 +75,7 @@ from firable.analysis.evidence.certificate import Rule, Step
 from firable.analysis.evidence.checking.cubes import Cube, firings
 from firable.analysis.evidence.checking.facts import Facts, Literal, Move, facts_of
 from firable.analysis.evidence.checking.obligation import TimedTerms
-from firable.analysis.evidence.refusal import TimeIsOverError, refuse
+from firable.analysis.evidence.refusal import TimeIsOverError, in_time, refuse, ticking
 from firable.analysis.induction.smt import Operator, Term
 from firable.nets.formula import And, Deadlock, Formula, conjuncts
 from firable.nets.net import Net
@@ -296,6 +296,7 @@ class _Around:
 
     def __init__(self, draft: Draft, step: Step, place: int) -> None:
         self.draft, self.place, rest = draft, place, draft.values[place]
+        self.tick = ticking(draft.deadline)
         self.away = place, not rest
         self.openers, self.closers = sorted(draft.at[place, rest]), sorted(draft.at[self.away])
         both = [*self.openers, *self.closers]
@@ -305,6 +306,7 @@ class _Around:
         draft._require(step, self._closers_early() if step.rule is Rule.CLOSERS_EARLY else self._openers_late())
 
     def _others(self, one: Literal) -> Iterator[int]:
+        self.tick()
         for t in self.draft.at[one].difference(self.openers, self.closers):
             if not any(self.draft._exclude(self.away, need) for need in self.draft.moves[t][0].items()):
                 yield t
@@ -337,6 +339,7 @@ class _Around:
         return not self.draft.deadlock or all(self._without_competition(t) for t in self.openers)
 
     def _without_competition(self, t: int) -> bool:
+        self.tick()
         for one in self._lost(t):
             if self.draft.at[one].difference(self.closers) != {t} or self.draft._spoken(one[0]):
                 return False
@@ -348,7 +351,7 @@ class _Around:
         """Put in the place of openers and closers what they are in one."""
         draft = self.draft
         openers, closers = ([draft._take(t) for t in numbers] for numbers in (self.openers, self.closers))
-        for first, then in product(openers, closers):
+        for first, then in in_time(product(openers, closers), draft.deadline):
             if (move := _composed(first, then)) is not None:
                 draft._put(draft.next, _without(move, self.place))
                 draft.next += 1

@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.certificate import FiringSequence
 from firable.analysis.evidence.checking.obligations import played
 from firable.analysis.evidence.claims import Claim
@@ -59,9 +60,9 @@ class Lasso:
     loop: int
 
     @classmethod
-    def of(cls, net: Net, discipline: Discipline, sequence: FiringSequence) -> Lasso:
+    def of(cls, net: Net, discipline: Discipline, sequence: FiringSequence, deadline: Deadline = NEVER) -> Lasso:
         """The run that a firing sequence and a cycle are; refused where it is none, or goes on."""
-        markings = played(net, discipline, (*sequence.firings, *sequence.cycle))
+        markings = played(net, discipline, (*sequence.firings, *sequence.cycle), deadline)
         fired = [frozenset(names) for names in (*sequence.firings, *sequence.cycle)]
         loop = len(sequence.firings)
         if sequence.cycle:
@@ -123,17 +124,21 @@ class Lasso:
         return [not value for value in never]
 
 
-def check_refuting_run(net: Net, discipline: Discipline, claim: Claim, sequence: FiringSequence) -> None:
+def check_refuting_run(
+    net: Net, discipline: Discipline, claim: Claim, sequence: FiringSequence, deadline: Deadline = NEVER
+) -> None:
     """Refuse a run that satisfies the formula of LTL which it is to refute."""
     if has_events(claim.goal) and discipline is Discipline.STEP:
         refuse("`fires` names one firing, and a step holds several")
-    if Lasso.of(net, discipline, sequence).values(claim.goal)[0]:
+    if Lasso.of(net, discipline, sequence, deadline).values(claim.goal)[0]:
         refuse(f"the run satisfies ({format_temporal(claim.goal)})")
 
 
-def check_unanswered_run(net: Net, discipline: Discipline, claim: Claim, sequence: FiringSequence) -> None:
+def check_unanswered_run(
+    net: Net, discipline: Discipline, claim: Claim, sequence: FiringSequence, deadline: Deadline = NEVER
+) -> None:
     """Refuse a run that is not fair, or in which what is asked for never stays without the answer."""
-    run = Lasso.of(net, discipline, sequence)
+    run = Lasso.of(net, discipline, sequence, deadline)
     answered = [holds(net, claim.then, marking) for marking in run.markings]
     asked = [holds(net, claim.state_goal, marking) for marking in run.markings]
     last = max((i for i, answer in enumerate(answered) if answer), default=-1)
