@@ -228,15 +228,15 @@ def values_of(term: Term, assignment: Mapping[str, bool]) -> dict[Term, bool]:
 
 _INLINE_DEPTH_MAX: Final = 24  # a deeper subterm is cut out by a definition: parsers of other solvers may recurse
 _LINE_MAX: Final = 110
-_NOT_QUOTED: Final = re.compile(r"[^ -~]|[|\\%]")
-"""What may not stand between bars, and `%`, which marks it."""
+_NOT_QUOTED: Final = re.compile(r"[^ -~]|[|\\%]|\A\.|\A(?=(?:true|false|not|and|or|xor|distinct|ite|as|_|=)\Z).")
+"""What may not stand between bars, `%`, which marks it, and how no symbol may begin that somebody declares."""
 
 
 def symbol(name: str) -> str:
     """A name as a quoted symbol.
 
-    >>> symbol("robot.free"), symbol("a|b"), symbol("é"), symbol("50%"), symbol(chr(92))
-    ('|robot.free|', '|a%7c.b|', '|%e9.|', '|50%25.|', '|%5c.|')
+    >>> symbol("robot.free"), symbol("a|b"), symbol("é"), symbol("50%"), symbol(chr(92)), symbol(".p"), symbol("true")
+    ('|robot.free|', '|a%7c.b|', '|%e9.|', '|50%25.|', '|%5c.|', '|%2e.p|', '|%74.rue|')
     """
     return f"|{in_ascii(name)}|"
 

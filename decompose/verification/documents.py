@@ -29,7 +29,7 @@ from firable.analysis.evidence.refusal import TimeIsOverError
 from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.formulas import FALSE, Formula, Formulas
 from firable.decompose.verification.refusal import NotShownError
-from firable.decompose.verification.solvers import Answers
+from firable.decompose.verification.solvers import Answers, SolverError
 from firable.decompose.verification.votes import PREFIX, question_of, votes
 from firable.decompose.verification.words import SENTENCES, sentence_of, weight_of_conflicts
 from firable.nets.diagnostics import InputError
@@ -161,7 +161,12 @@ def _ask_again(document: Document, file: str, answers: Answers, timeout_ms: int)
             except TimeIsOverError:
                 continue  # the record is then only claimed, as the checker says of it
             for text in texts:
-                if text not in asked and answers(text, timeout_ms)[-1:] == ("sat",):
+                try:
+                    refuted = text not in asked and answers(text, timeout_ms)[-1:] == ("sat",)
+                except SolverError as error:
+                    message = f"the solver cannot read an obligation of '{file}' on '{record.name}': {error}"
+                    raise NotShownError(message, "evidence", file) from None
+                if refuted:
                     raise NotShownError(f"an obligation of '{file}' on '{record.name}' is refuted", "evidence", file)
                 asked.add(text)
             if on is not None:

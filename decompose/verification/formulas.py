@@ -20,16 +20,21 @@ TRUE: Final[Formula] = 0
 FALSE: Final[Formula] = 1
 
 _BY_NUMBER: Final = re.compile(r"[^ -~]|[|\\%]")
+_RESERVED: Final = frozenset({"true", "false", "not", "and", "or", "xor", "distinct", "ite", "as", "_", "="})
+"""What nobody may declare, even between bars; nor what begins with a point."""
 
 
 @lru_cache(2**16)
 def spelled(name: str) -> str:
     """A name as a file spells it: what is not printable ASCII, a bar, a backslash or `%` by its number.
 
-    >>> spelled("robot.free"), spelled("é"), spelled("50%"), spelled("|"), spelled(chr(92))
-    ('robot.free', '%e9.', '50%25.', '%7c.', '%5c.')
+    So is the first character of what SMT-LIB reserves.
+
+    >>> spelled("robot.free"), spelled("é"), spelled("50%"), spelled("|"), spelled(chr(92)), spelled(".p")
+    ('robot.free', '%e9.', '50%25.', '%7c.', '%5c.', '%2e.p')
     """
-    return _BY_NUMBER.sub(lambda found: f"%{ord(found[0]):x}.", name)
+    text = _BY_NUMBER.sub(lambda found: f"%{ord(found[0]):x}.", name)
+    return f"%{ord(text[0]):x}.{text[1:]}" if text in _RESERVED or text.startswith(".") else text
 
 
 class Formulas:

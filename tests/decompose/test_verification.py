@@ -13,6 +13,7 @@ from support.remembered import answered
 
 from firable.analysis.check import check
 from firable.analysis.evidence.document import document_from_text
+from firable.analysis.induction.smt import symbol
 from firable.analysis.spaces.reachability import Budget
 from firable.decompose.bundling import make_bundle
 from firable.decompose.proofs.families import FAMILIES
@@ -23,6 +24,7 @@ from firable.decompose.verification import documents
 from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.checking import check_bundle
 from firable.decompose.verification.documents import UNDECIDED
+from firable.decompose.verification.formulas import spelled
 from firable.decompose.verification.obligations import compared
 from firable.decompose.verification.protocol import TITLE, blocks, published
 from firable.decompose.verification.recut import Cut, check_cut
@@ -362,6 +364,35 @@ def test_a_solver_that_cannot_read_a_file_says_so() -> None:
     for answers in SOLVERS.values():
         with pytest.raises(SolverError):
             answers("(assert nothing)", 1000)
+
+
+def test_a_solver_that_cannot_read_an_obligation_of_a_document_is_no_internal_error(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    bundle, files = bundled("conceptual_one_robot"), set(bundled("conceptual_one_robot").evidence.values())
+
+    def picky(text: str, timeout_ms: int) -> tuple[str, ...]:
+        if text in files or text == "(set-logic QF_UF)":
+            return answered(text, timeout_ms)
+        raise SolverError("no symbol begins so")
+
+    monkeypatch.setattr("firable.decompose.verification.checking.SOLVERS", {"cvc5": picky})
+    with pytest.raises(InputError, match=r"cannot read an obligation of 'check.evidence.json'"):
+        check_bundle(bundle)
+
+
+RESERVED = (".p", "..", "true", "false", "not", "and", "or", "xor", "distinct", "ite", "as", "_", "=", "%2e.p", "let")
+
+
+@pytest.mark.parametrize("name", RESERVED)
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_names_that_smt_lib_reserves_are_spelled_so_that_solvers_take_them(solver: str, name: str) -> None:
+    assert symbol(name) == f"|{spelled(name)}|"
+    asked = f"(declare-const {symbol(name)} Bool)(assert (not {symbol(name)}))(check-sat)"
+    assert SOLVERS[solver](f"(set-logic QF_UF){asked}", 1000) == ("sat",)
+    asked = f"(declare-const {symbol(name)} Bool)(assert {symbol(name)})(check-sat)"
+    assert SOLVERS[solver](f"(set-logic QF_UF){asked}", 1000) == ("sat",)
+    assert len({*map(symbol, RESERVED)}) == len(RESERVED)
 
 
 def test_a_bundle_without_documents_is_refused() -> None:
