@@ -175,8 +175,10 @@ def _decided_otherwise(decomposition: Decomposition) -> Iterator[Diagnostic]:
     """What the table decides otherwise than the net makes it: by another coordinator, or in another order."""
     net = decomposition.net
     at = deciders(net)
-    if {row.name: row.at for row in decomposition.coordinated} != at:
-        yield Diagnostic("F5002", "the coordinators of the table are not those of the net", _REMEDY, ("table",))
+    rows = [(row.name, row.at, sorted(part.controller for part in row.parts)) for row in decomposition.coordinated]
+    if rows != [(name, at[name], sorted(map(str, owners(net, net.transition(name))))) for name in at]:
+        message = "the rows of the table, with their coordinators and who takes part, are not those of the net"
+        yield Diagnostic("F5002", message, _REMEDY, ("table",))
     elif decomposition.groups != tuple(groups(net, at)):
         message = "the arbitration groups of the table do not decide as those of the net"
         yield Diagnostic("F5002", message, _REMEDY, ("table",))

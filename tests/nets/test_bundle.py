@@ -445,6 +445,10 @@ OTHERWISE = (
         *(replace(DECOMPOSITION, groups=(group,)) for group in OTHERWISE),
         replace(DECOMPOSITION, groups=(GROUP, GROUP)),
         *(replace(DECOMPOSITION, coordinated=(replace(ROW, at=name), LOCAL)) for name in ("a", "b", "nobody")),
+        replace(DECOMPOSITION, coordinated=(ROW, replace(LOCAL, parts=()))),
+        replace(DECOMPOSITION, coordinated=(ROW,)),
+        replace(DECOMPOSITION, coordinated=(ROW, replace(LOCAL, parts=()), LOCAL)),
+        replace(DECOMPOSITION, coordinated=(LOCAL, ROW)),
     ],
 )
 def test_table_that_decides_otherwise_than_the_net_may_not_run(edited: Decomposition) -> None:
