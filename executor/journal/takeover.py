@@ -174,7 +174,8 @@ class _Moving:
             if place not in self.marking:
                 yield _against(
                     f"the command of '{place}' is under way, and its token has gone on",
-                    "let the machine end it, and stop the old bundle after that",
+                    "let the machine end it, and stop the old bundle after that; where it cannot, start the old bundle "
+                    "again and resume it: its machine is asked, and what it knows nothing of is under way no more",
                 )
 
     def taken_over(self, coordinators: Iterable[str]) -> dict[str, Kept]:

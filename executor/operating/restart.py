@@ -31,6 +31,7 @@ _TELLS: Final = {
     Answer.NOT_RECEIVED: "has not reached its machine, and will be sent when the run is resumed",
     Answer.UNKNOWN: "was issued, and nobody knows what became of it",
 }
+_VOID: Final = "was given up, its token has gone on: it is not sent again"
 
 
 @dataclass
@@ -55,8 +56,7 @@ async def take_up(run: Host, found: TakingUp) -> None:
     for name, controller in run.controllers.items():
         for place, entry in controller.commands.questions:
             answer = Answer((await run.driver.ask(run.net.place(place), entry)).value)
-            is_marked = bool(controller.word & 1 << controller.subnet.place_index[place])  # else it is void
-            if answer is Answer.NOT_RECEIVED and is_marked and was_taken(run.journal, place, entry):
+            if answer is Answer.NOT_RECEIVED and not _is_void(run, place) and was_taken(run.journal, place, entry):
                 answer = Answer.UNKNOWN
                 run.told("held", f"the machine of '{place}' had taken its command, and knows nothing of it any more")
             if answer is Answer.UNKNOWN:
@@ -135,12 +135,19 @@ def told(run: Host, found: TakingUp) -> str:
     """The hold in words: each command that is not over, and what there is to do."""
     lines = ["the run was interrupted, and is taken up where it was; nothing moves until it is resumed"]
     for place, answer in found.answers.items():
-        lines.append(f"'{run.net.place(place).command}' of '{place}' {_TELLS[answer]}")
+        tells = _VOID if answer is Answer.NOT_RECEIVED and _is_void(run, place) else _TELLS[answer]
+        lines.append(f"'{run.net.place(place).command}' of '{place}' {tells}")
     owed = [place for controller in run.controllers.values() for place, _ in controller.commands.owed]
     for place in owed:
-        if place not in found.answers:
+        if place not in found.answers and not _is_void(run, place):
             lines.append(f"'{run.net.place(place).command}' of '{place}' was decided and not sent; it will be")
     if found.is_final and (open_ := uncertain(run)):
         how = "say" if run.served and not run.stopping else "--say"
         lines.append(f"look at the machine and say what it did: {how} {open_[0]}=done, =working or =not-received")
     return "; ".join(lines)
+
+
+def _is_void(run: Host, place: str) -> bool:
+    """Whether the token of a command has gone on, as by a time limit: what has not reached its machine is not sent."""
+    controllers = (of for of in run.controllers.values() if place in of.subnet.place_index)
+    return not any(of.word & 1 << of.subnet.place_index[place] for of in controllers)

@@ -19,6 +19,8 @@ from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.driver import Answer, Clock, Listener
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import Journal, MemoryJournal
+from firable.executor.journal.takeover import take_over
+from firable.executor.links.link import COORDINATOR
 from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.ending import with_failed
 from firable.executor.operating.host import Host
@@ -46,6 +48,10 @@ transitions:
   begin: {from: robot.free, to: robot.working}
   end: {from: robot.working, to: robot.waiting, if: robot.key}
 """
+TIMED_LAMP = LAMP.replace(
+    "until: worked}",
+    "until: worked, within: 500ms}\n      working_fault: {send: {machine: R, command: STOP}, until: at_rest}",
+).replace("transitions:", "transitions:\n  again: {from: robot.working_fault, to: robot.working}")
 
 
 class Machine(DryRunDriver):
@@ -76,8 +82,10 @@ async def present(_: Host) -> None:
     await asyncio.sleep(60)
 
 
-def run_of(journal: Journal, *, overdue_seconds: float = 120.0, resume: bool = False) -> tuple[Host, Machine]:
-    net = parse_net(LAMP)
+def run_of(
+    journal: Journal, *, overdue_seconds: float = 120.0, resume: bool = False, text: str = LAMP
+) -> tuple[Host, Machine]:
+    net = parse_net(text)
     decomposition = split(net)
     machine = Machine(decomposition.subnets, 1.0, {"robot.key": False})
     machine.sent = []
@@ -165,15 +173,15 @@ def test_a_disk_that_fails_while_a_run_is_taken_up_resumes_nothing() -> None:
     run_in_virtual_time(main())
 
 
-def crashed() -> MemoryJournal:
-    """The journal of a run that has crashed when its command was issued."""
+def crashed(text: str = LAMP) -> MemoryJournal:
+    """The journal of a run that has crashed a second after its command was issued."""
     journal = MemoryJournal()
 
     async def main() -> None:
-        run, machine = run_of(journal)
+        run, machine = run_of(journal, text=text)
         ending = asyncio.create_task(run.main())
         await asyncio.sleep(1)
-        assert machine.sent == [("robot.working", 1)]
+        assert machine.sent[0] == ("robot.working", 1)
         assert run.outcome is not None
         run.outcome.cancel()
         with pytest.raises(asyncio.CancelledError):
@@ -202,6 +210,31 @@ def test_a_resume_after_the_stop_of_a_run_that_is_held_commands_nothing() -> Non
         assert machine.sent == []
 
     run_in_virtual_time(main())
+
+
+def test_a_command_that_its_time_limit_gave_up_is_not_said_to_be_sent_when_the_run_is_resumed() -> None:
+    """Whoever resumes looks at what moves then; and a new bundle goes on once the machine was asked."""
+    journal = crashed(TIMED_LAMP)
+    cell = split(parse_net(TIMED_LAMP))
+    with pytest.raises(InputError) as caught:
+        take_over(cell, cell, journal.of, [COORDINATOR])
+    assert "start the old bundle again and resume it" in caught.value.diagnostics[0].hint
+
+    async def main() -> None:
+        run, machine = run_of(journal, text=TIMED_LAMP)
+        ending = asyncio.create_task(run.main())
+        await asyncio.sleep(3)
+        told = run.situation().message
+        assert "'R WORK' of 'robot.working' was given up, its token has gone on" in told
+        assert "'R STOP' of 'robot.working_fault' has not reached its machine, and will be sent" in told
+        assert run.resume()
+        await asyncio.sleep(1)
+        assert machine.sent == [("robot.working_fault", 1)]
+        run.stop()
+        await ending
+
+    run_in_virtual_time(main())
+    assert take_over(cell, cell, journal.of, [COORDINATOR]).marking == ("robot.working_fault",)
 
 
 def test_a_pause_while_a_run_is_held_holds_until_the_operator_resumes() -> None:
