@@ -31,6 +31,7 @@ from firable.nets.document import Name, OptionalName, given
 from firable.nets.document_errors import Shape, document_problems, keys_of, version_problem
 from firable.nets.net import Net, SignalKind
 from firable.nets.source import Source, quoted, read_source
+from firable.nets.well_formed import is_name
 from firable.nets.yaml_tree import Node, Path, Scalar, as_written, data, node_span, nodes_along, parse_tree
 
 SIZE_BYTES_MAX: Final = 1024 * 1024
@@ -319,6 +320,7 @@ def _span(source: Source, tree: Node, path: Path) -> Span:
 
 
 def _inconsistencies(model: PlantModel) -> Iterator[tuple[Path, str, str]]:
+    yield from _no_names(model)
     stations = set(model.stations)
     for i, name in enumerate(model.stations):
         if name in model.stations[:i]:
@@ -380,6 +382,18 @@ def _inconsistencies(model: PlantModel) -> Iterator[tuple[Path, str, str]]:
             hint = "a machine with `hand`, or with a command that does `carry`, holds workpieces"
             yield ("sensors", name, "holding"), f"'{sensor.holding}' never holds anything", hint
     yield from _disagreements(model)
+
+
+def _no_names(model: PlantModel) -> Iterator[tuple[Path, str, str]]:
+    """What the places and transitions of the closed loop are named after, and verdicts on machines."""
+    named: list[tuple[Path, str, str]] = [(("stations", i), name, "station") for i, name in enumerate(model.stations)]
+    for name, machine in model.machines.items():
+        path = ("machines", name)
+        named.append((path, name, "machine"))
+        named += [((*path, "positions", position), position, "position") for position in machine.positions]
+    for where, name, what in named:
+        if not is_name(name):
+            yield where, f"{quoted(name)} is not a name for a {what}", "use letters, digits, '_', '-' and '.'"
 
 
 def _disagreements(model: PlantModel) -> Iterator[tuple[Path, str, str]]:
