@@ -6,16 +6,20 @@ beyond being right; they are laid out as one would by hand: a block for each mac
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 from urllib.parse import urlsplit
 
 from firable.executor.drivers.binding import Binding, writes
-from firable.executor.drivers.device import Point, Value
+from firable.executor.drivers.device import Point, Use, Value
 from firable.executor.drivers.far_side.end import FarEnd
+from firable.executor.drivers.kinds import kind_named
 from firable.nets.diagnostics import InputError
 from firable.nets.net import Command, Net, Place, SignalKind
+from firable.nets.yaml_tree import is_ambiguous
+from firable.nets.yaml_writing import scalar
 
 PORTS: Final[dict[str, str]] = {"modbus": "15020", "opcua": "14840", "mqtt": "11883", "serial": ""}
 """The protocols, and the port of this host at which each is served; a serial line gets its name when it is made."""
@@ -24,6 +28,8 @@ HERE: Final = "127.0.0.1"
 """Where cells are served."""
 
 HEARTBEAT_S: Final = 0.2
+
+_PLAIN: Final = re.compile(r"\w[\w.;=/-]*(?: [\w.;=/-]+)*")
 
 DESCRIPTION: Final = "description: a simulated cell behind real servers, by firable sim"
 """The line by which a binding that was made here is told from one of a site."""
@@ -58,7 +64,7 @@ class _Layout:
             registers = {"code": "holding 0", "number": "holding 1", "taken": "input 0", "done": "input 1"}
             table, _, offset = registers.get(part, "input 2").partition(" ")
             return f"{table} {10 * i + 10 + int(offset)}"
-        return self._named(f"{name}/{part}")
+        return self._named(f"{name}/{part}", f"machine{i}/{part}")
 
     def device(self, part: str) -> Point:
         """A point of the device itself."""
@@ -70,14 +76,23 @@ class _Layout:
         """How the i-th sensor is read, and whether it may be forced."""
         if self.protocol == "modbus":
             return f"read: discrete {i + 1}"
-        return f"read: {self._named(f'sensors/{name}')}, force: true"
+        return f"read: {_word(self._named(f'sensors/{name}', f'sensors/{i}'))}, force: true"
 
     def button(self, sensors: int) -> Point:
         """Where the contact of the emergency stop is read, behind so many sensors."""
         return f"discrete {sensors + 1}" if self.protocol == "modbus" else self._named("device/button")
 
-    def _named(self, name: str) -> Point:
-        return {"opcua": f"ns=2;s={name}", "mqtt": f"cell/{name}"}.get(self.protocol, name)
+    def _named(self, name: str, else_name: str = "") -> Point:
+        """A point that is called so, or by its number where the protocol cannot have that: a line has no umlauts."""
+        point = {"opcua": f"ns=2;s={name}", "mqtt": f"cell/{name}"}.get(self.protocol, name)
+        if else_name and kind_named(self.protocol).point_problem(point, Use.READ):
+            return self._named(else_name)
+        return point
+
+
+def _word(text: str) -> str:
+    """A name or a point, in quotes where YAML takes it for something else."""
+    return text if _PLAIN.fullmatch(text) and not is_ambiguous(text) else scalar(text)
 
 
 def binding_text(net: Net, ports: Mapping[str, str], sensed: Collection[str]) -> str:
@@ -89,7 +104,7 @@ def binding_text(net: Net, ports: Mapping[str, str], sensed: Collection[str]) ->
     owners = {place.owner: of[command.machine] for place, command in commanded}
     lines = [
         "firable_bind: 1",
-        f"cell: {net.name}",
+        f"cell: {_word(net.name)}",
         DESCRIPTION,
     ]
     lines += ["", "devices:"]
@@ -101,8 +116,8 @@ def binding_text(net: Net, ports: Mapping[str, str], sensed: Collection[str]) ->
         lines.append(f"    safe: {{{layout.device('stop')}: true}}")
         lines.append("    channels:")
         for name, i in own.items():
-            points = ", ".join(f"{part}: {layout.machine(name, i, part)}" for part in layout.parts)
-            lines.append(f"      {name}: {{{points}}}")
+            points = ", ".join(f"{part}: {_word(layout.machine(name, i, part))}" for part in layout.parts)
+            lines.append(f"      {_word(name)}: {{{points}}}")
     # A broker shows nothing of a device that is lost, so no contact is read there.
     direct = [layout for layout in layouts if layout.protocol != "mqtt"]
     for layout in direct[:1]:
@@ -114,7 +129,7 @@ def binding_text(net: Net, ports: Mapping[str, str], sensed: Collection[str]) ->
             continue
         at = owners.get(signal.owner, layouts[0])
         read = f"{{device: {at.protocol}, {at.sensor(signal.name, i)}}}"
-        lines.append(f"  {signal.name}: {read if signal.name in sensed else 'acknowledged'}")
+        lines.append(f"  {_word(signal.name)}: {read if signal.name in sensed else 'acknowledged'}")
     return "\n".join([*lines, "", "commands:", *_commands(commanded, machines, of), ""])
 
 
@@ -125,9 +140,9 @@ def _commands(
     for place, command in commanded:
         name, layout = command.machine, of[command.machine]
         code = codes.setdefault(str(command), len(codes) + 1)
-        write = f", write: {{{layout.machine(name, machines.index(name), 'code')}: {code}}}"
+        write = f", write: {{{_word(layout.machine(name, machines.index(name), 'code'))}: {code}}}"
         written = write if "number" in layout.parts else ""
-        yield f"  {place.name}: {{device: {layout.protocol}, channel: {name}{written}}}"
+        yield f"  {_word(place.name)}: {{device: {layout.protocol}, channel: {_word(name)}{written}}}"
 
 
 def ends_of(binding: Binding) -> dict[str, FarEnd]:

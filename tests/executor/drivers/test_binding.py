@@ -12,12 +12,13 @@ from firable.executor.drivers import kinds
 from firable.executor.drivers.binding import parse_binding, read_binding
 from firable.executor.drivers.bound import BoundDriver, bound_driver
 from firable.executor.drivers.device import files_of
-from firable.executor.drivers.far_side.ends import ends_of
+from firable.executor.drivers.far_side.ends import PORTS, binding_text, ends_of
 from firable.executor.drivers.fitting import misfits
 from firable.executor.drivers.modbus import ModbusTcp
 from firable.executor.drivers.opcua import OpcUa
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.diagnostics import InputError
+from firable.nets.net import SignalKind
 from firable.nets.text import parse_net
 
 NET_TEXT = """
@@ -553,3 +554,31 @@ def test_a_file_that_cannot_be_read_is_refused_with_its_line_where_its_device_is
     assert str(tmp_path / "keys/site.pem") in refused.value.diagnostics[0].message
     assert "folder of the binding" in refused.value.diagnostics[0].hint
     assert bound_driver(read_binding(path), NET, NET), "the broker is another host's"
+
+
+LONG = "s" * 100
+ODD = parse_net(f"""\
+firable: 1
+cell: 'line #2: "fast"'
+controllers:
+  tür+1:
+    start: "on"
+    inputs: [a=b, "null", zu_für, {LONG}]
+    places:
+      "on":
+      go: {{send: {{machine: "M# 1: x", command: "G,O"}}, until: "yes"}}
+      gone: {{send: {{machine: "null", command: STOP}}, until: "no"}}
+transitions:
+  begin: {{from: tür+1.on, to: tür+1.go, if: [tür+1.a=b, tür+1.null, tür+1.zu_für, tür+1.{LONG}]}}
+  end: {{from: tür+1.go, to: tür+1.gone}}
+""")
+
+
+@pytest.mark.parametrize("protocol", PORTS)
+def test_a_binding_that_is_written_for_a_simulated_cell_is_read_whatever_its_names_are(protocol: str) -> None:
+    """A topic has no `+`, a word on a line no umlaut and not a hundred letters, and YAML signs of its own."""
+    sensed = [signal.name for signal in ODD.signals if signal.kind is SignalKind.SENSOR]
+    assert len(sensed) == 4
+    bound_driver(
+        parse_binding(binding_text(ODD, {protocol: "/dev/line" if protocol == "serial" else "1502"}, sensed)), ODD
+    )
