@@ -67,6 +67,8 @@ AGAIN: Final = "ask again, and let it come to its end"
 """What helps where Ctrl-C has ended a search."""
 INTERRUPTED: Final = "interrupted"
 """What the course of a report tells of Ctrl-C."""
+_OF_BUDGET: Final = ("markings", "memory", "time")
+"""Why the explicit engine has ended where its budget is used up."""
 _ALONE_SECONDS: Final = 0.1
 """How long techniques that hold all markings are alone, before others begin beside them."""
 _SPACES_SHARE: Final = 0.6  # of the time, for techniques that hold all markings
@@ -165,7 +167,7 @@ class _Check:
             return self._explored(first)
         course = [f"the first {first.n_markings:,} markings are not all"]
         settling = self._settling()
-        ends: list[str | None] = []
+        ends: dict[str, str] = {}
         space = self._whole(settling, course, ends)
         if space is not None:  # sets may take far longer than one run that is nearby
             share = _share(self.deadline, _FORMULAS_SHARE)
@@ -173,6 +175,9 @@ class _Check:
         # What had no room with indexes may have it without.
         late = {Method.COMPACT: _COUNTING_SHARE} if {"memory", "markings"} & set(ends) else {}
         report = self._report(space or first, settling.found if space is None else settling.shown())
+        if space is None:  # as far as anybody came, and not as far as was looked before the race
+            furthest = next((bound for reason, bound in ends.items() if reason in _OF_BUDGET), first.bound)
+            report = replace(report, verdicts=tuple(_reaching(of, first, furthest) for of in report.verdicts))
         return self._settled(report, settling, FIRST_KNOWERS | late, (*GOAL_LANES, *FORMULA_LANES), course)
 
     def _without_a_graph(self, error: InputError) -> CheckReport:
@@ -275,11 +280,11 @@ class _Check:
             self.net, self.discipline, budget, deadline=self.deadline, progress=self.progress, threads=threads
         )
 
-    def _whole(self, settling: Settling, course: list[str], ends: list[str | None]) -> StateSpace[Any] | None:
+    def _whole(self, settling: Settling, course: list[str], ends: dict[str, str]) -> StateSpace[Any] | None:
         """All markings, by whichever technique is first; None where none of them could hold them all.
 
-        `ends` is told why the explicit engine ended. The settling is begun beside it, and given up where all markings
-        are there.
+        `ends` is told how far the explicit engine came, by the reason why it ended. The settling is begun beside it,
+        and given up where all markings are there.
         """
         limits = Limits(_share(self.deadline, _SPACES_SHARE), self.budget.memory_bytes)
         enough, space = Event(), None
@@ -306,8 +311,8 @@ class _Check:
         begun.result()
         return space
 
-    def _held_explicitly(self, ends: list[str | None], limits: Limits) -> StateSpace[Any]:
-        """The graph; `ends` is told why the engine ended."""
+    def _held_explicitly(self, ends: dict[str, str], limits: Limits) -> StateSpace[Any]:
+        """The graph; `ends` is told how far it came, by the reason why the engine ended."""
         budget = replace(self.budget, memory_bytes=limits.memory_bytes, seconds=None)
         try:
             graph = explore(
@@ -321,7 +326,7 @@ class _Check:
             )
         except InputError as error:  # a part of the memory does not hold the net itself, and others may need less
             raise BudgetExceeded(error.diagnostics[0].message) from None
-        ends.append(graph.engine.reason)
+        ends[str(graph.engine.reason)] = graph.bound
         graph.require_complete()
         return graph
 
@@ -415,12 +420,18 @@ def _size(space: StateSpace[Any]) -> str:
 
 def _left_off(report: CheckReport) -> CheckReport:
     """A report that Ctrl-C has ended: what is unknown by that, and by no budget, is no matter of the budget."""
-    of_budget = (REASONS["markings"], REASONS["memory"], REASONS["time"])
+    of_budget = tuple(REASONS[reason] for reason in _OF_BUDGET)
     told = (
         replace(verdict, hint=AGAIN) if verdict.hint == LARGER and not verdict.bound.endswith(of_budget) else verdict
         for verdict in report.verdicts
     )
     return replace(report, verdicts=tuple(told))
+
+
+def _reaching(verdict: Verdict, first: ReachabilityGraph, bound: str) -> Verdict:
+    """A verdict that the first markings leave unknown, with the bound that was reached behind them."""
+    is_left = verdict.status is Status.UNKNOWN and verdict.bound == first.bound
+    return replace(verdict, bound=bound) if is_left else verdict
 
 
 def _told(report: CheckReport, course: Sequence[str]) -> CheckReport:

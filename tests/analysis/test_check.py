@@ -191,3 +191,17 @@ def test_an_unknown_verdict_says_so_where_the_time_was_over_before_anybody_was_a
     monkeypatch.setattr("firable.analysis.settling.race", lambda *_: outcome)
     report = check(catalogue_net("one_robot"), method="pdr")
     assert report.verdict("deadlock-free").bound == "no technique was asked any more"
+
+
+def test_an_unknown_verdict_says_how_far_the_budget_led_and_not_where_the_race_began(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Whoever is told of the first markings alone allows a few more, and comes no further."""
+    monkeypatch.setattr(module, "FIRST_MARKINGS", 5)
+    monkeypatch.setattr(module, "SPACES", {})
+    monkeypatch.setattr(module, "FIRST_KNOWERS", {})
+    monkeypatch.setattr(module, "KNOWERS", {})
+    for budget in (Budget(20, seconds=5), Budget(5, seconds=5)):
+        bound = check(catalogue_net("one_robot"), budget=budget).verdict("home-markings").bound
+        assert bound.startswith(f"{budget.markings} markings found")
+        assert bound.endswith("the budget of markings is used up")
