@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import click
 
@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     from firable.analysis.spaces.reachability import Budget
     from firable.nets.machines.plant_file import PlantModel
     from firable.nets.net import Net
+
+_INNER: Final = ("property.loop.", "property.cell.")
+"""How the parts of what is asked are called in the net of the loop, which has dozens of them for one verdict."""
 
 machines_option = click.option(
     "--machines",
@@ -185,8 +188,11 @@ def show_loop(report: Report, *, verbose: bool) -> None:
     click.echo(f"  the loop has {', '.join(text.counted(n, word) for n, word in counts)} and {edges}{whole}")
     click.echo(f"  {text.counted(loop['markings_gates_free'], 'marking')} with gates free{whole_free}")
     if verbose or len(report.course) > 1:
-        for line in report.course:
+        told = [line for line in report.course if verbose or not line.startswith(_INNER)]
+        for line in told:
             click.echo(f"  {line}")
+        if left_out := len(report.course) - len(told):
+            click.echo(f"  asked one by one: {text.counted(left_out, 'question')} about the loop; -v tells of each")
     rows = loop["comparison"]
     width = max((len(row["question"]) for row in rows), default=12)
     click.echo(f"\n{click.style('side by side', bold=True)}{' ' * (width - 6)}gates free  with its machines")

@@ -322,6 +322,23 @@ def test_one_ctrl_c_ends_all_explorations_for_a_bundle(
     assert "--max-seconds" not in told
 
 
+def test_the_parts_of_what_is_asked_of_a_loop_are_told_by_name_to_who_asks_for_all(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They are many, and have names that stand in no file."""
+    monkeypatch.setattr("firable.analysis.check.FIRST_MARKINGS", 200)
+    monkeypatch.setattr("firable.analysis.check.SPACES", {})
+    limits = ["--max-markings", "300", "--max-seconds", "3", "--no-cache"]
+    assert main(["check", CELL, "--machines", PLANT, *limits]) == 3
+    brief = capsys.readouterr().out
+    assert "property.loop.completion.1: " not in brief
+    assert re.search(r"asked one by one: \d+ questions about the loop; -v tells of each", brief)
+    assert main(["check", CELL, "--machines", PLANT, *limits, "-v"]) == 3
+    whole = capsys.readouterr().out
+    assert "property.loop.completion.1: " in whole
+    assert "-v tells of each" not in whole
+
+
 def test_a_bundle_that_is_kept_back_by_how_many_markings_are_written_down_is_not_told_to_take_more_time(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
