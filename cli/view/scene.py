@@ -79,8 +79,7 @@ class Stage:
         if machine in scene.busy:
             scene = self.done(scene, scene.busy[machine])
         if isinstance(action, Carry) and scene.on(machine) is None:
-            scene = self._arrives(scene, action.source) if action.source == self.plant.arrivals.station else scene
-            scene = scene.moved(action.source, machine)
+            scene = self._came(scene, action.source).moved(action.source, machine)
         scene = replace(scene, busy={**scene.busy, machine: name})
         return scene if place.completion is not None else self.done(scene, name)
 
@@ -97,7 +96,7 @@ class Stage:
             case Move():
                 return replace(scene, hands={**scene.hands, machine: parameters.get("to", "")})
             case Grasp() if at is not None and scene.on(machine) is None:
-                return scene.moved(at, machine)
+                return self._came(scene, at).moved(at, machine)
             case Put() if at is not None and scene.on(at) is None:
                 return scene.moved(machine, at)
             case Carry(target=target) if scene.on(target) is None:
@@ -118,7 +117,8 @@ class Stage:
                 scene = self.done(scene, name)
         sensor = self.plant.sensors.get(signal)
         if sensor is not None and sensor.station == self.plant.arrivals.station:
-            scene = self._arrives(scene, self.plant.arrivals.station)
+            scene = scene if sensor.may_flicker else self._cleared(scene, sensor.station)
+            scene = self._came(scene, sensor.station)
         return self._held(scene, signal)
 
     def fired(self, scene: Scene, transitions: Iterable[str], *, sends: bool) -> Scene:
@@ -184,11 +184,23 @@ class Stage:
             }
         return {"scene": scene.to_json(), "doing": doing, "words": self.words(scene)}
 
-    def _arrives(self, scene: Scene, station: str) -> Scene:
-        if scene.on(station) is not None:
+    def _came(self, scene: Scene, station: str) -> Scene:
+        """At the station of the arrivals a workpiece lies by now, whether or not its sensor has told so."""
+        if station != self.plant.arrivals.station or scene.on(station) is not None:
             return scene
         number = scene.arrived + 1
         return replace(scene, pieces=(*scene.pieces, Piece(number, station)), arrived=number)
+
+    def _cleared(self, scene: Scene, station: str) -> Scene:
+        """A sensor shows a workpiece anew: the one before is in the hand that is told to grasp there.
+
+        The next one comes as soon as the station is empty, and that is seen before the grasp is said to be done.
+        """
+        for machine, name in scene.busy.items():
+            at = self.plant.machines[machine].positions.get(scene.hands.get(machine, ""))
+            if at == station and scene.on(machine) is None and isinstance(self._action(self.net.place(name)), Grasp):
+                return scene.moved(station, machine)
+        return scene
 
     def _held(self, scene: Scene, signal: str) -> Scene:
         """A sensor that sees a workpiece in a hand is believed: a grasp that was given up may have been done."""

@@ -111,6 +111,26 @@ def test_a_sensor_of_a_hand_is_believed_after_a_grasp_that_was_given_up() -> Non
         assert (scene.hands, [piece.on for piece in scene.pieces]) == ({"R": "EXIT"}, ["R"])
 
 
+@pytest.mark.parametrize("tells", [(), ("robot.part_there",)], ids=["still there", "there again"])
+def test_a_workpiece_that_comes_while_the_one_before_is_grasped_is_not_lost(tells: tuple[str, ...]) -> None:
+    """The station is full again before the grasp is said to be done, whether or not its sensor could tell."""
+    manual = (Path(__file__).parents[2] / "docs" / "time-limits.md").read_text("utf-8")
+    net, plant_file = re.findall(r"^```yaml\n(.*?)^```", manual.partition("given twice\n")[2], re.MULTILINE | re.DOTALL)
+    stage = Stage(parse_net(net), parse_plant(plant_file))
+    scene = stage.signal(stage.begin(), "robot.part_there")
+    for number in (1, 2, 3):
+        scene = stage.fired(
+            stage.signal(stage.fired(scene, ("start",), sends=True), "robot.arrived"), ("grip",), sends=True
+        )
+        for signal in tells:
+            scene = stage.signal(scene, signal)
+        scene = stage.signal(scene, "robot.grasped")
+        assert scene.pieces == (Piece(number, "R"), *(Piece(number + 1, "table") for _ in tells))
+        scene = stage.signal(stage.fired(scene, ("carry",), sends=True), "robot.arrived")
+        scene = stage.signal(stage.fired(scene, ("release",), sends=True), "robot.laid_down")
+        scene = stage.fired(scene, ("end",), sends=True)
+
+
 def test_the_gripper_of_an_arm_that_carries_is_its_own_station_and_a_belt_has_none() -> None:
     view = top_view(plant("two_cells"))
     assert {name: arm["gripper"] for name, arm in view["arms"].items()} == {"RA": ["gripper_a"], "RB": ["gripper_b"]}
