@@ -31,7 +31,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from firable.executor.operating.watched_loop import REMEMBERED, Look, Move, WatchedLoop, Work
+from firable.executor.operating.watched_loop import REMEMBERED, Formed, Look, Move, WatchedLoop, Work
 from firable.nets.machines.plant_file import PlantModel
 from firable.nets.net import Marking, Net
 from firable.semantics.trace import CommandSent, Event, Fired, Noted, SignalChanged, Trace
@@ -76,8 +76,9 @@ class _Demand(NamedTuple):
     subject: str
 
 
-_Demanded = tuple[list[tuple[str, Work]], list[tuple[int, str]], list[Look]]
-"""The commands that must be done, by their places; the signals that must be taken; the cameras that must judge."""
+_Demanded = tuple[list[tuple[str, Work]], list[tuple[int, str]], list[Look], list[Formed]]
+"""The commands that must be done, by their places; the signals that must be taken; the cameras that must judge; the
+completions that must be formed."""
 
 _Belief = dict[Marking, tuple[float, ...]]
 """Each marking of the loop with, for each place in `WatchedLoop.timed`, when it last changed there; a signal, without
@@ -253,7 +254,7 @@ class Monitor:
 
     def _demands(self, marking: Marking, since: tuple[float, ...]) -> Iterator[_Demand]:
         """What must have happened by when, if the loop is in this marking."""
-        works, signals, looks = self._demanded(marking)
+        works, signals, looks, formed = self._demanded(marking)
         for place, work in works:
             over = self.sent_seconds.get(place, 0.0) + work.longest_seconds
             if work.waits_while_empty:
@@ -265,6 +266,9 @@ class Monitor:
         for look in looks:
             begun = max(since[i] for i in look.timed)
             yield _Demand(begun + look.longest_seconds + self.latency_seconds, look.sensor)
+        for one in formed:
+            since_seconds = max(since[i] for i in one.timed)
+            yield _Demand(self._excused(since_seconds, one.signal) + self.latency_seconds, one.signal)
 
     def _demanded(self, marking: Marking) -> _Demanded:
         """What must happen in a marking, whenever it came about."""
@@ -281,8 +285,9 @@ class Monitor:
         if len(self.demanded_in) >= REMEMBERED:
             self.demanded_in.clear()
         looks = [look for look in self.loop.looks if not marking & look.empty and not marking & look.verdicts]
-        self.demanded_in[key] = works, signals, looks
-        return works, signals, looks
+        formed = [one for one in self.loop.formed if one.move.firable(marking)]
+        self.demanded_in[key] = works, signals, looks, formed
+        return self.demanded_in[key]
 
     def _look_at_promises(self, at_seconds: float) -> None:
         held = {name for name in self.signals if self.is_held(name)}

@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Final
 
 from firable.nets.machines.closing import close
@@ -68,6 +69,16 @@ class Look:
     """The indexes in `WatchedLoop.timed` of what begins a look when it changes."""
 
 
+@dataclass(frozen=True, slots=True)
+class Formed:
+    """A completion of a command that was acknowledged before its sensor saw it: due as soon as the move is firable."""
+
+    signal: str
+    move: Move
+    timed: tuple[int, ...]
+    """The indexes in `WatchedLoop.timed` of what makes it so when it changes."""
+
+
 Hidden = list[tuple[tuple[int, ...], tuple[Marking, ...]]]
 """The markings that hidden moves lead to, by the indexes in `WatchedLoop.timed` of the places that these change."""
 
@@ -106,11 +117,18 @@ class WatchedLoop:
         self.work = {place.name: self._work(laws, place.name, loop.at) for place in laws.commanding}
         waited = (work.waits_while_empty for work in self.work.values() if work.waits_while_empty)
         begun = {station: self._beginning(laws, station) for station in sorted(laws.judged)}
-        others = dict.fromkeys((*waited, *(bit for bits in begun.values() for bit in bits)))
+        shows = {
+            signal: moves[f"{signal}/shown"] for signal in loop.acknowledged if not model.sensors[signal].may_flicker
+        }
+        showing = {signal: _bits((one.needs | one.forbids) & ~self._bit(signal)) for signal, one in shows.items()}
+        others = dict.fromkeys((*waited, *chain.from_iterable((*begun.values(), *showing.values()))))
         self.timed = (*(bit for bit, _ in self.shown), *others)
-        """The places of which it is kept when they last changed: those of the signals, then those waited for, or looked
-        at."""
+        """The places of which it is kept when they last changed: those of the signals, then those waited for, those
+        looked at, and those that form a completion."""
         self.looks = tuple(self._look(laws, station, bits) for station, bits in begun.items())
+        self.formed = tuple(
+            Formed(signal, one, tuple(map(self.timed.index, showing[signal]))) for signal, one in shows.items()
+        )
         self._hidden_in: dict[Marking, Hidden] = {}
         self._timed_by: dict[Marking, tuple[int, ...]] = {}
 
@@ -203,3 +221,8 @@ def _union(masks: Iterable[int]) -> int:
     for mask in masks:
         union |= mask
     return union
+
+
+def _bits(mask: Marking) -> list[Marking]:
+    """The places of a mask, one by one."""
+    return [1 << i for i in range(mask.bit_length()) if mask >> i & 1]

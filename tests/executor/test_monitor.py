@@ -61,6 +61,74 @@ def test_a_completion_that_a_stuck_sensor_holds_back_is_named() -> None:
     assert "robot.grasp_cv1" in found.places
 
 
+SOAKING = """
+firable: 1
+cell: soaking
+controllers:
+  hoist:
+    start: free
+    inputs: part_there
+    places:
+      free:
+      grasp:  {send: {machine: H, command: GRASP, at: TANK}, until: gripped}
+      aside:  {send: {machine: H, command: MOVE, to: EXIT}, until: there}
+      put:    {send: {machine: H, command: PUT, at: EXIT}, until: laid}
+      back:   {send: {machine: H, command: MOVE, to: TANK}, until: there}
+  tank:
+    start: empty
+    places:
+      empty:
+      soaking: {send: {machine: W, command: SOAK}, until: lifted}
+transitions:
+  soak:  {from: [tank.empty, hoist.free], to: [tank.soaking, hoist.grasp], if: hoist.part_there}
+  lift:  {from: [tank.soaking, hoist.grasp], to: [tank.empty, hoist.aside]}
+  lay:   {from: hoist.aside, to: hoist.put}
+  leave: {from: hoist.put, to: hoist.back}
+  end:   {from: hoist.back, to: hoist.free}
+"""
+SOAKING_PLANT = """
+firable_plant: 1
+plant: soaking
+stations: [tank, exit]
+arrivals: {station: tank, every_s: 10}
+departures: {station: exit, after_s: 1}
+machines:
+  H:
+    hand: TANK
+    positions: {TANK: tank, EXIT: exit}
+    commands:
+      GRASP: {does: grasp, takes_s: 2}
+      MOVE: {does: move, takes_s: 1}
+      PUT: {does: put, takes_s: 1}
+  W: {commands: {SOAK: {does: work, takes_s: 0.5}}}
+sensors:
+  hoist.part_there: {occupied: tank}
+  tank.lifted: {holding: H}
+"""
+
+
+@pytest.mark.parametrize("stuck", [False, True])
+def test_a_completion_that_is_formed_behind_its_acknowledgement_is_not_waited_for_in_silence(stuck: bool) -> None:
+    """The tank has said that it soaks; the hoist holds the part, and what sees it there is stuck."""
+    net, plant, stream = parse_net(SOAKING), parse_plant(SOAKING_PLANT), io.StringIO()
+    disturbances = [StuckSensor("tank.lifted", value=False)] if stuck else []
+    execute(split(net), plant, workpieces=3, trace=stream, disturbances=disturbances, watch=Watch.IGNORE)
+    trace, monitor = parse_trace(stream.getvalue()), Monitor(net, plant)
+    if not stuck:
+        assert watch(monitor, trace) is None
+        return
+    for event in trace.events:
+        if event.at_seconds < 3:
+            assert monitor.seen(event) is None
+    due = monitor.deadline_seconds()
+    assert due is not None
+    assert 2.5 <= due < 3.5, "half a second behind the grasp, twice at the most"
+    found = monitor.passed(4)
+    assert found is not None
+    assert found.message == "'tank.lifted' must be 1 by now, and is still 0"
+    assert found.places == ("tank.soaking", "hoist.grasp")
+
+
 def test_a_sensor_that_drops_while_the_workpiece_lies_there_is_unexplained() -> None:
     found = watched("one_robot", run_of("one_robot", StuckSensor("mc.part_present", value=False, from_seconds=10.0)))
     assert found is not None
