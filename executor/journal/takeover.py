@@ -9,8 +9,9 @@ It is refused unless
 
 - no round is decided and unacknowledged, and no promise is open: a decision of the old net may mean nothing in the new;
 - every place with a token is a place of the new net, which sends the same command and waits for the same completion;
-- a command that is under way belongs to a place that has the token still, and its machine gets its commands from the
-  same places in both nets: they are numbered by these (`drivers/channels.py`), so that a machine asked by another
+- a command that is under way belongs to a place that has the token still, or that gives it up by a time limit in both
+  nets (after a restart it is asked after like the others, and never sent again), and its machine gets its commands from
+  the same places in both nets: they are numbered by these (`drivers/channels.py`), so that a machine asked by another
   number would not know the command, and be given it again;
 - the marking is *reachable* in the new net. What was proved of the new net was proved of its reachable markings, so
   this one condition carries every verdict over. It is decided by whoever asks (`firable takeover` asks the analysis),
@@ -171,7 +172,7 @@ class _Moving:
                     "net, by which it would have another number there",
                     "let the machine end it, and stop the old bundle after that",
                 )
-            if place not in self.marking:
+            if place not in self.marking and not self._is_given_up(place):
                 yield _against(
                     f"the command of '{place}' is under way, and its token has gone on",
                     "let the machine end it, and stop the old bundle after that; where it cannot, start the old bundle "
@@ -213,6 +214,14 @@ class _Moving:
                 f"'{place}' has a token, and sends another command in the new net, or waits for another completion",
                 "run the old bundle on until the token has left it",
             )
+
+    def _is_given_up(self, place: str) -> bool:
+        """Whether a command whose token has gone on is one that both nets give up when its time is over."""
+        if place not in self.new.net.place_index:
+            return False
+        before, after = self.old.net.place(place), self.new.net.place(place)
+        alike = (before.command, before.completion) == (after.command, after.completion)
+        return alike and before.within is not None and after.within is not None
 
     def _numbered_anew(self, place: str) -> str | None:
         """The machine of a place, where its commands have other numbers in the new net."""

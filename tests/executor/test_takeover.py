@@ -9,6 +9,7 @@ from firable.executor.drivers.binding import ChannelDocument
 from firable.executor.drivers.channels import Channel
 from firable.executor.journal.takeover import take_over
 from firable.executor.links.link import COORDINATOR
+from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
 from firable.executor.protocol.messages import EPOCH_BITS, Keep, Sending, Stored, VoteRequest
@@ -51,6 +52,26 @@ def test_a_command_under_way_keeps_its_number_and_is_asked_after() -> None:
     assert moved.under_way == ("robot.working",)
     assert robot.commands.questions == (("robot.working", 7),)
     assert robot.read("robot.worked", value=True, entry=6) == []
+
+
+def test_a_command_that_a_time_limit_gave_up_is_asked_after_and_hinders_no_new_net_that_gives_it_up_too() -> None:
+    """The machine hangs, and the new net is there because of that."""
+    text = OLD.replace("until: worked}", "until: worked, within: 5s}").replace(
+        "transitions:", "transitions:\n  again: {from: robot.working_fault, to: robot.working}"
+    )
+    old, new = cell(text), cell(text.replace("5s", "9s"))
+    given_up: dict[str, Stored] = {"command/signal/robot.worked": ("robot.working", 7, "issued")}
+    kept = kept_in({"robot.working_fault", "table.full"}, old, robot=given_up)
+    moved = take_over(old, new, kept, [COORDINATOR])
+    robot = LocalController.restored(new, "robot", moved.kept["robot"])
+    assert moved.under_way == ("robot.working",)
+    assert robot.commands.questions == (("robot.working", 7),)
+    robot.answer("robot.working", 7, Answer.NOT_RECEIVED)
+    assert not any(isinstance(effect, Sending) and effect.place == "robot.working" for effect in robot.resume())
+    untimed = text.replace(", within: 5s", "").replace("      free:\n", "      free:\n      working_fault:\n")
+    for other in (text.replace("command: WORK", "command: GRIND"), untimed):
+        with pytest.raises(InputError, match="has gone on"):
+            take_over(old, cell(other), kept, [COORDINATOR])
 
 
 def test_the_number_of_a_command_that_is_over_goes_on() -> None:
