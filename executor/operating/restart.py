@@ -84,7 +84,7 @@ async def take_up(run: Host, found: TakingUp) -> None:
     if not found.resume or run.paused or not run.resume():  # paused: as it is after a stop or a fault, too
         for name, controller in run.controllers.items():
             if controller.held:
-                run.told("held", f"{called(name)} is held after a restart, until it is resumed")
+                run.told("held", f"{called(name)} is held, until it is resumed")
     run.moved()
 
 

@@ -37,7 +37,7 @@ def waits(
             if above not in coordinators and above not in away:
                 yield f"{called(name)} has taken its votes back, and waits for {called(above)} to say that none is used"
         if controller.held:
-            yield f"{called(name)} is held after a restart, until it is resumed"
+            yield f"{called(name)} is held, until it is resumed"
 
 
 def reached(name: str, away: Collection[str]) -> str:

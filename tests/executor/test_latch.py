@@ -86,6 +86,8 @@ def test_button_latches_and_the_cell_goes_on_after_it_is_released_reset_and_resu
             order = [note for note in notes if note in {"emergency stop", "not reset", "reset", "taken up"}]
             assert order == ["emergency stop", "not reset", "reset", "taken up"]
             assert any("latched: emergency stop: modbus: 'button' is open" in sentence for sentence in said)
+            assert "held: 'robot' is held, until it is resumed" in said
+            assert not any("restart" in sentence for sentence in said), "a reset is none"
 
     asyncio.run(main())
 

@@ -67,8 +67,8 @@ def test_while_held_nothing_that_needs_the_machine_fires(tmp_path: Path) -> None
         stood = cell.firings()
         await asyncio.sleep(30)
         assert cell.firings() == stood
-        assert any("held after a restart" in sentence for sentence in cell.hosts[ROBOT].peers.waits())
-        assert ("held", "'robot' is held after a restart, until it is resumed") in cell.told
+        assert any("is held, until it is resumed" in sentence for sentence in cell.hosts[ROBOT].peers.waits())
+        assert ("held", "'robot' is held, until it is resumed") in cell.told
         await cell.stop()
         cell.replayed()
 
