@@ -22,6 +22,8 @@ from firable.cli.simulated_run import run_simulated_of, show_simulated
 
 if TYPE_CHECKING:
     from firable.executor import Answer, Operator
+    from firable.nets.bundle import Bundle
+    from firable.nets.machines.plant_file import PlantModel
     from firable.nets.net import Net
 
 _SPEEDS = {"max": None, "1": 1.0, "10": 10.0}
@@ -136,6 +138,8 @@ def run(
         loaded = load(bundle, trust)
         cell = plant_for(bundle, loaded.net.name) if plant is None and options.is_simulated else plant
         model = None if cell is None else read_machines_of(cell, loaded.net)
+        if model is not None:
+            _warn_of_other_machines(loaded, model)
         service = served.service(bundle, model)
         pace = 1.0 if options.bind is not None else _SPEEDS[speed]
         stepped: AbstractContextManager[Operator | None] = nullcontext()
@@ -163,6 +167,15 @@ def run(
         return replace(report, files=(trace,) if trace else ())
 
     return answer("run", format_, make, _show)
+
+
+def _warn_of_other_machines(bundle: Bundle, model: PlantModel) -> None:
+    """Tell where the machines are not those with which the bundle was proved."""
+    from firable.nets.machines.plant_file import otherwise_than, parse_plant
+
+    if (sealed := bundle.evidence.get("plant.yaml")) is not None:
+        for problem in otherwise_than(parse_plant(sealed), model):
+            text.show_diagnostic(problem)
 
 
 def _refuse_combinations(

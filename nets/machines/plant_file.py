@@ -18,11 +18,11 @@ machines than a net commands, the file is at fault as well: a plant remembers wh
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from enum import StrEnum
 from math import isclose
 from pathlib import Path as FilePath
-from typing import Annotated, Final, Literal, get_args
+from typing import Annotated, Any, Final, Literal, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, ValidationError
 
@@ -410,6 +410,9 @@ def _disagreements(model: PlantModel) -> Iterator[tuple[Path, str, str]]:
             yield ("sensors", name, "likely"), message, hint
 
 
+_OF_THE_SIMULATION: Final = frozenset({"takes_s", "jitter_s", "every_s", "after_s", "likely", "description"})
+
+
 def _share(probability: float) -> str:
     return f"{round(probability, 9):.9g}"
 
@@ -454,6 +457,31 @@ def late_limits(model: PlantModel, net: Net) -> tuple[Diagnostic, ...]:
             )
         )
     return tuple(found)
+
+
+def otherwise_than(sealed: PlantModel, model: PlantModel) -> tuple[Diagnostic, ...]:
+    """A warning (F5003) where a plant is not that with which a bundle was proved; no proof asks for its times."""
+    path = _difference(_untimed(sealed.model_dump(by_alias=True)), _untimed(model.model_dump(by_alias=True)), ())
+    if path is None:
+        return ()
+    message = f"{quoted('.'.join(map(str, path)))}: the bundle was proved with a plant file that says otherwise here"
+    hint = "what the bundle shows of machines is not shown of these: make it anew, with --machines and this plant file"
+    return (Diagnostic("F5003", message, hint, tuple(map(str, path)), model.span(path), Severity.WARNING),)
+
+
+def _untimed(part: Any) -> Any:
+    """What a plant file says, without what only its simulation reads."""
+    if isinstance(part, Mapping):
+        return {key: _untimed(value) for key, value in part.items() if key not in _OF_THE_SIMULATION}
+    return [_untimed(one) for one in part] if isinstance(part, list | tuple) else part
+
+
+def _difference(one: Any, other: Any, path: Path) -> Path | None:
+    """The first place at which two texts of data differ; None: nowhere."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        inner = (_difference(one.get(key), other.get(key), (*path, key)) for key in {**other, **one})
+        return next((found for found in inner if found is not None), None)
+    return None if one == other else path
 
 
 def _misfits_of_places(model: PlantModel, net: Net) -> Iterator[Diagnostic]:

@@ -537,3 +537,41 @@ def test_what_a_stop_breaks_off_may_still_be_done_until_the_machine_is_at_rest(
     run = accident(tmp_path, capsys, cell, stop)
     assert [name for name in run if name in ends] == list(ends)
     assert bool(run) == bool(ends)
+
+
+PRESS = """\
+firable: 1
+cell: press
+controllers:
+  press: {start: open, inputs: there, places: {open: , down: {send: {machine: P, command: RUN}, until: pressed}}}
+transitions:
+  close: {from: press.open, to: press.down, if: press.there}
+  open: {from: press.down, to: press.open}
+"""
+PRESS_PLANT = """\
+firable_plant: 1
+plant: press
+stations: [table]
+arrivals: {station: table, every_s: 5}
+departures: {station: table}
+machines:
+  P: {commands: {RUN: {does: work, takes_s: 1}}}
+sensors:
+  press.there: {occupied: table}
+"""
+
+
+def test_a_run_tells_that_its_machines_are_not_those_that_the_bundle_was_proved_with(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    net, plant, bundle = (tmp_path / f"press.{kind}" for kind in ("firable.yaml", "plant.yaml", "bundle"))
+    net.write_text(PRESS)
+    plant.write_text(PRESS_PLANT)
+    assert main(["bundle", str(net), "-o", str(bundle), "--machines", str(plant)]) == 0
+    for changed, where in (("takes_s: 1", ""), ("takes_s: 1, may_fail: for_good", "machines.P.commands.RUN.may_fail")):
+        plant.write_text(PRESS_PLANT.replace("takes_s: 1", changed).replace("every_s: 5", "every_s: 2"))
+        capsys.readouterr()
+        main(["run", str(bundle), "--workpieces", "1"])
+        told = capsys.readouterr().err
+        assert (f"warning[F5003]: '{where}': the bundle was proved with" in told) == bool(where)
+        assert ("F5003" in told) == bool(where)
