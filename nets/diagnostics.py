@@ -262,13 +262,17 @@ class InputError(Exception):
 def did_you_mean(name: str, known: Sequence[str]) -> str:
     """The start of a hint that names the closest known name, or nothing where none is close.
 
-    The same name under another owner is close, where one owner alone has it.
+    The same name under another owner is close, where one owner alone has it; and so is one that looks the same, because
+    an accent is a character of its own in one of the two.
 
     >>> did_you_mean("lathe.belt", ["conveyor.belt", "lathe.free"])
     "did you mean 'conveyor.belt'? "
     """
     from difflib import get_close_matches
+    from unicodedata import normalize
 
+    if not name.isascii() and (alike := next((x for x in known if normalize("NFC", x) == normalize("NFC", name)), "")):
+        return f"'{alike}' looks the same, and is written with other characters: copy it from there; "
     owner, _, own = name.rpartition(".")
     elsewhere = [one for one in known[:20_000] if one.endswith(f".{own}")] if owner else []
     if len(elsewhere) == 1:

@@ -148,3 +148,11 @@ def test_a_command_that_is_told_can_be_typed_as_it_stands(tmp_path: Path, capsys
     said = [shlex.split(found) for found in re.findall(r"firable ((?:replay|verify) .*)", capsys.readouterr().out)]
     assert {words[0] for words in said} == {"replay", "verify"}
     assert [main(words) for words in said] == [0] * len(said)
+
+
+def test_a_name_that_looks_the_same_is_said_to_be_another() -> None:
+    """Some keyboards and file systems take letters with accents apart; nobody sees that."""
+    composed, apart = "t\u00fcr", "tu\u0308r"
+    for name, known in ((composed, apart), (apart, composed)):
+        hint = did_you_mean(name, ["tor", known])
+        assert hint == f"'{known}' looks the same, and is written with other characters: copy it from there; "
