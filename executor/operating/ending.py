@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Collection
 from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 from firable.executor.operating import latch, restart
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 AT_THE_END: Final = "stopped at the end of the cycle"
 ENDS_WITH_THE_CYCLE: Final = "the operator has asked for the end at the end of the cycle"
+_LOOKED_AT: Final = 1_000  # markings, for what brings work into a cell
 _TOLD_ALREADY: Final = (State.FAULT, State.STOPPED, State.LATCHED)
 """An end says what has become of devices, and a latched host what is against a reset."""
 
@@ -180,12 +182,14 @@ def alone(run: Host) -> str:
     return f"{names} alone {'are' if len(run.controllers) > 1 else 'is'} waited for; the cell may not be empty"
 
 
+@lru_cache(16)
 def beginnings(net: Net) -> tuple[str, ...]:
     """The transitions by which work comes into a cell that is as at the beginning: an operator who ends the cycle bars
     them.
 
     They are firable in the initial marking, and a sensor opens them, which sees the workpiece that has come; of a net
-    in which none is, all that are firable there.
+    in which none is, all that are firable there. One behind which no machine gets a command, as long as the others are
+    barred, brings no work: a key that holds the cell is obeyed until its end.
 
     >>> from firable.nets.catalogue import catalogue_net
     >>> beginnings(catalogue_net("one_robot")), beginnings(catalogue_net("two_cells"))
@@ -195,7 +199,34 @@ def beginnings(net: Net) -> tuple[str, ...]:
     firable = [c.name for c in player.transitions.values() if c.openable and c.firable(initial, player.places)]
     sensors = {signal.name for signal in net.signals if signal.kind is SignalKind.SENSOR}
     seen = [name for name in firable if any(gate.signal in sensors for gate in net.transition(name).external)]
-    return tuple(seen or firable)
+    barred = list(seen)
+    for name in seen:
+        others = [each for each in barred if each != name]
+        if others and _is_without_commands(net, others):
+            barred = others
+    return tuple(barred or firable)
+
+
+def _is_without_commands(net: Net, barred: Collection[str]) -> bool:
+    """Whether no command can follow the initial marking, gates free, while these transitions fire no more.
+
+    Of more markings than are looked at it is believed that one can.
+    """
+    player = TokenPlayer.of(net)
+    commanding = sum(1 << i for i, place in enumerate(net.places) if place.command is not None)
+    free = [one for one in player.transitions.values() if one.openable and one.name not in barred]
+    found, open_ = {net.initial_marking}, [net.initial_marking]
+    while open_ and len(found) <= _LOOKED_AT:
+        marking = open_.pop()
+        for one in free:
+            if one.firable(marking, player.places):
+                after = one.fire(marking) & player.places
+                if after & commanding & ~marking:
+                    return False
+                if after not in found:
+                    found.add(after)
+                    open_.append(after)
+    return not open_
 
 
 def _nobody_waits(run: Host) -> bool:

@@ -9,12 +9,14 @@ from firable.decompose import split
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.links.link import COORDINATOR
+from firable.executor.operating.ending import beginnings
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.situation import State
 from firable.executor.protocol.messages import VoteRequest
 from firable.nets.catalogue import catalogue_net
 from firable.nets.net import Place
+from firable.nets.text import parse_net
 from firable.semantics.trace import Noted, read_trace
 
 
@@ -144,3 +146,37 @@ def test_an_emergency_stop_needs_neither_coordinator_nor_link(tmp_path: Path) ->
         await cell.stop()
 
     run_in_virtual_time(main())
+
+
+HELD = """
+firable: 1
+cell: held
+controllers:
+  line:
+    start: running
+    inputs: [hold, release, door, gate]
+    places: {running: , held: , doors: , gates: , counted: }
+  robot:
+    start: free
+    inputs: part
+    places: {free: , taken: , work: {send: {machine: R, command: WORK}, until: worked}}
+transitions:
+  hold: {from: line.running, to: line.held, if: line.hold}
+  release: {from: line.held, to: line.running, if: line.release}
+  take: {from: robot.free, to: robot.taken, if: [robot.part, line.running]}
+  begin: {from: robot.taken, to: robot.work}
+  end: {from: robot.work, to: robot.free}
+"""
+
+
+def test_an_end_of_the_cycle_bars_what_brings_work_and_not_the_key_that_holds_the_cell() -> None:
+    """What holds work up is obeyed to the end; of two that bring work together one is barred at least."""
+    assert beginnings(parse_net(HELD)) == ("take",)
+    two = HELD.replace(
+        "  begin:",
+        "  one: {to: line.doors, if: line.door}\n  two: {to: line.gates, if: line.gate}\n"
+        "  both: {from: [line.doors, line.gates, robot.free], to: robot.taken}\n  begin:",
+    )
+    assert beginnings(parse_net(two)) == ("take", "two")
+    nothing = HELD.replace("send: {machine: R, command: WORK}, until: worked", "description: at work")
+    assert beginnings(parse_net(nothing)) == ("take",)
