@@ -112,7 +112,8 @@ def test_a_completion_that_is_formed_behind_its_acknowledgement_is_not_waited_fo
     """The tank has said that it soaks; the hoist holds the part, and what sees it there is stuck."""
     net, plant, stream = parse_net(SOAKING), parse_plant(SOAKING_PLANT), io.StringIO()
     disturbances = [StuckSensor("tank.lifted", value=False)] if stuck else []
-    execute(split(net), plant, workpieces=3, trace=stream, disturbances=disturbances, watch=Watch.IGNORE)
+    cell = SimulatedCell(plant, workpieces=3, disturbances=disturbances)
+    execute(split(net), cell, Conduct(trace=stream, watch=Watch.IGNORE))
     trace, monitor = parse_trace(stream.getvalue()), Monitor(net, plant)
     if not stuck:
         assert watch(monitor, trace) is None
