@@ -17,6 +17,9 @@ over.
 The *lease* is set, and not left at Zenoh's ten seconds: a frozen host is noticed after it. A killed one is noticed at
 once. While the line is down nothing is kept: what is sent then is lost, and the link is up again by itself.
 
+A key with a wildcard in it is none of ours, and is dropped before it is read: Zenoh lets anybody publish to all keys of
+a pattern at once, and such a key has other parts than the one that it was subscribed by.
+
 Nothing listens unless an address is given, and multicast is off. Beyond one machine, `tls/` addresses with certificates
 on both sides (`Certificates`) keep strangers out; plain `tcp/` beyond loopback lets anybody on the network speak.
 Whoever has a certificate of the site may be any of its machines.
@@ -32,6 +35,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
@@ -43,7 +47,7 @@ from urllib.parse import quote, unquote
 import zenoh
 
 from firable.executor.links.claims import Answer, Claims, Said
-from firable.executor.links.encoding import EncodingError, pack, unpack
+from firable.executor.links.encoding import MESSAGE_BYTES_MAX, EncodingError, pack, unpack
 from firable.executor.links.lending import LendingLoop
 from firable.executor.links.link import COORDINATOR, QUESTION, Arrival, Greeting, LinkListener, cannot_open, objection
 from firable.executor.links.standing import Standing
@@ -61,6 +65,10 @@ _NAMELESS: Final = "%"  # which no name is quoted to
 _WITH: Final = "-"  # which is in no identity
 _AND: Final = ","  # which is in no quoted name
 _REST: Final = "**"
+_WILD: Final = "*"  # which is in no key of ours, and in each that stands for several
+_VERSION: Final = re.compile("[0-9]{1,9}", re.ASCII)
+_OVERHEAD_BYTES_MAX: Final = 1 << 16
+"""What Zenoh sends beside a message: its key, above all."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,6 +205,7 @@ class ZenohLink:
             "scouting/gossip/enabled": False,
             "transport/link/tx/lease": round(self.lease_seconds * 1000),
             "transport/link/tx/keep_alive": 4,
+            "transport/link/rx/max_message_size": MESSAGE_BYTES_MAX + _OVERHEAD_BYTES_MAX,
             # A connection that was begun while the line was down must not hold up the next for ten seconds.
             "transport/unicast/open_timeout": round(_OPENING_SECONDS * 1000),
             "transport/unicast/accept_timeout": round(_OPENING_SECONDS * 1000),
@@ -223,8 +232,10 @@ class ZenohLink:
 
     def _on(self, loop: asyncio.AbstractEventLoop, sample: zenoh.Sample, *, is_message: bool) -> None:
         """A sample has come, on a thread of Zenoh; after the loop's end nobody hears it."""
-        gone = sample.kind == zenoh.SampleKind.DELETE
-        key, payload = str(sample.key_expr), sample.payload.to_bytes()
+        gone, key = sample.kind == zenoh.SampleKind.DELETE, str(sample.key_expr)
+        if _WILD in key:
+            return
+        payload = sample.payload.to_bytes()
         self.samples.append((is_message, key, payload, gone))
         if is_message and self.lending is not None and self._is_taken_here(self.lending):
             return
@@ -294,7 +305,7 @@ class ZenohLink:
             session, _, storage = claim.partition(_WITH)
             if session == self.identity:
                 return
-            greeting = Greeting(_read(digest), _all_read(machines), int(version) if version.isdecimal() else -1)
+            greeting = Greeting(_read(digest), _all_read(machines), int(version) if _VERSION.fullmatch(version) else -1)
             if (why := objection(self.greeting, greeting)) is not None:
                 if not gone:
                     self.objected[session] = greeting.names
@@ -320,6 +331,8 @@ class ZenohLink:
         receiver, peer, session = _parsed(key)
         # Only from the process that is known to run the machine: another one, or one not yet met, is not heard.
         if gone or self.claims is None or self.claims.reached.get(peer) != session:
+            return ()
+        if receiver not in self.greeting.names:
             return ()
         try:
             age, message = unpack(payload)

@@ -14,7 +14,7 @@ from support.link_rigs import PATIENCE_SECONDS, Heard, running
 
 from firable.executor.drivers.bench import until
 from firable.executor.drivers.far_side.ports import free_port
-from firable.executor.links.encoding import pack
+from firable.executor.links.encoding import MESSAGE_BYTES_MAX, pack
 from firable.executor.links.link import COORDINATOR, PROTOCOL_VERSION, Greeting
 from firable.executor.links.storages import Memory, Storage
 from firable.executor.links.zenoh_link import Certificates, ZenohLink, open_to_the_network
@@ -136,6 +136,63 @@ def test_what_a_stranger_publishes_is_not_delivered() -> None:
             assert {m for _, _, m in centre.messages} == {Report("robot", Readiness(7, frozenset()))}
 
     asyncio.run(main())
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        "firable/**",
+        "firable/*/*/alive/*/*",
+        f"firable/{PROTOCOL_VERSION}/d1/alive/**",
+        f"firable/{PROTOCOL_VERSION}/d1/heard/**",
+        f"firable/{PROTOCOL_VERSION}/d1/stands/**",
+        f"firable/{PROTOCOL_VERSION}/d1/to/%/**",
+        f"firable/{'9' * 5000}/d1/alive/robot/abc-x",
+    ],
+)
+def test_no_key_of_a_stranger_ends_a_link(key: str) -> None:
+    """Zenoh lets anybody publish to all keys of a pattern at once; and a number may be longer than any is."""
+
+    async def main() -> None:
+        at = f"tcp/127.0.0.1:{free_port()}"
+        here, stranger = ZenohLink(CENTRE, listen=[at]), ZenohLink(Greeting("d2", ("stranger",)), join=[at])
+        async with asyncio.timeout(PATIENCE_SECONDS), running(here) as centre, running(stranger):
+            await centre.until_told(("refused", "stranger"))
+            assert stranger.session is not None
+            stranger.session.put(key, b"nothing of ours")
+            token = stranger.session.liveliness().declare_token(key)
+            token.undeclare()
+            async with running(ZenohLink(ROBOT, join=[at])):  # it is heard behind that
+                await centre.until_told(("connected", "robot"))
+            assert here.broken is not None
+            assert not here.broken.done()
+
+    asyncio.run(main())
+
+
+def test_a_message_to_a_machine_that_is_not_here_is_not_delivered() -> None:
+    async def main() -> None:
+        at = f"tcp/127.0.0.1:{free_port()}"
+        here, there = ZenohLink(CENTRE, listen=[at]), ZenohLink(ROBOT, join=[at])
+        async with asyncio.timeout(PATIENCE_SECONDS), running(here) as centre, running(there) as robot:
+            await centre.until_told(("connected", "robot"))
+            await robot.until_told(("connected", COORDINATOR))
+            assert there.session is not None
+            to = f"firable/{PROTOCOL_VERSION}/d1/to/%/{here.identity}"
+            message = pack(0, Report("robot", Readiness(0, frozenset()), "mc"))
+            there.session.put(f"{to}/to/mc/{here.identity}/from/robot/{there.identity}", message)
+            while not centre.messages:
+                there.send("robot", COORDINATOR, Report("robot", Readiness(7, frozenset())))
+                await asyncio.sleep(0.02)
+            assert {receiver for _, receiver, _ in centre.messages} == {COORDINATOR}
+
+    asyncio.run(main())
+
+
+def test_a_link_takes_no_message_that_is_larger_than_any_of_ours() -> None:
+    """Zenoh would put one of a gigabyte together for anybody who can reach the address."""
+    size = json.loads(ZenohLink(CENTRE)._configuration().get_json("transport/link/rx/max_message_size"))
+    assert MESSAGE_BYTES_MAX < size < 2 * MESSAGE_BYTES_MAX
 
 
 def test_an_address_that_is_taken_is_refused() -> None:
