@@ -56,6 +56,7 @@ from firable.executor.links.standing import Standing
 from firable.executor.links.storages import Estranged, Memory, Storage
 from firable.executor.operating.acquaintances import KEEP_SECONDS, Acquaintances
 from firable.executor.operating.acts import Acts
+from firable.executor.operating.between import Between
 from firable.executor.operating.waits import reached, waits
 from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import Message, ToController
@@ -96,6 +97,7 @@ class Peers:
         self.link = link
         self.told = told
         self.repeat_seconds = self.pause_seconds = REPEAT_SECONDS
+        self.between = Between(decomposition)
         self.here = here = {*acts.coordinators, *acts.controllers}
         self.names = {*coordinators(decomposition), *(subnet.name for subnet in decomposition.subnets)} - here
         self.deciding = {above for controller in acts.controllers.values() for above in controller.above} - here
@@ -326,7 +328,8 @@ class Peers:
 
     def _may_say(self, sender: str, receiver: str, message: Message) -> bool:
         way = (message.coordinator, message.controller)
-        if (sender, receiver) == (way if isinstance(message, ToController) else way[::-1]):
+        is_its = (sender, receiver) == (way if isinstance(message, ToController) else way[::-1])
+        if is_its and receiver in self.here and self.between.has(message):
             return True
         self.told("dropped", f"{called(sender)} sent a {type(message).__name__} that is not its to send")
         return False

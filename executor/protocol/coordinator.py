@@ -294,8 +294,8 @@ class Coordinator:
         voted = self.rounds.get(vote.round)
         if voted is None and vote.round < self.epoch << EPOCH_BITS:
             yield self._decision(vote.controller, vote.round, None)  # nobody fires it: not committed, or over
-        # A vote of a round that is decided, or of none of ours, is stale (O5).
-        if voted is not None and not voted.decided:
+        # A vote of a round that is decided, or of none of ours, is stale (O5), and one of who was not asked is none.
+        if voted is not None and not voted.decided and vote.controller in voted.participants:
             voted.votes[vote.controller] = vote.promised
             if len(voted.votes) == len(voted.participants):
                 yield from self._decide(voted, self._choice(voted))

@@ -1,0 +1,89 @@
+"""What a host says that is not what it says it is: it is not heard, and the others go on."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+from support.hosts import Cell
+
+from firable.decompose.splitting.cut import split
+from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.operating.between import Between
+from firable.executor.protocol.coordinator import Coordinator
+from firable.executor.protocol.deciders import TOP
+from firable.executor.protocol.messages import (
+    Acknowledgement,
+    Decision,
+    Hello,
+    Message,
+    Readiness,
+    Report,
+    Vote,
+    VoteRequest,
+)
+from firable.nets.catalogue import catalogue_net
+
+ONE_ROBOT = split(catalogue_net("one_robot"))
+TWO_CELLS = split(catalogue_net("two_cells"))
+CELL_A = "coordinator cell_a"
+NONE = Readiness(1, frozenset())
+OTHER = frozenset({"nobody-has-this"})
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        Report("robot", Readiness(1, OTHER)),
+        Report("robot", NONE, "mc"),
+        Vote("robot", 5, OTHER, NONE),
+        Vote("robot", 5, frozenset(), Readiness(1, OTHER)),
+        Acknowledgement("robot", 5, Readiness(1, OTHER)),
+        VoteRequest("robot", 5, tuple(OTHER), 0, 0),
+        Decision("robot", 5, "nobody-has-this", 0, 0),
+        Hello("robot", 0, 0, 1, "mc"),
+        Hello("nobody", 0, 0, 1),
+    ],
+)
+def test_what_is_not_between_two_is_found(message: Message) -> None:
+    assert not Between(ONE_ROBOT).has(message)
+
+
+def test_a_coordinator_speaks_of_its_own_rounds_alone() -> None:
+    between = Between(TWO_CELLS)
+    own = 3 * 1000 + between.first_round[CELL_A]
+    for number, is_its in ((own, True), (own - 1, False), (own + 1, False)):
+        assert between.has(Decision("machine_a", number, None, 0, 0, 0, CELL_A)) is is_its
+        assert between.has(VoteRequest("machine_a", number, (), 0, 0, 0, CELL_A)) is is_its
+
+
+def test_a_host_that_says_what_nobody_knows_ends_no_other_one(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        centre = next(host for names, host in cell.hosts.items() if TOP in host.acts.coordinators)
+        await asyncio.sleep(0.5)
+        peer = next(name for name in sorted(centre.peers.connected_to) if name != TOP)
+        centre.peers.arrived(peer, TOP, Report(peer, Readiness(1 << 62, OTHER)), 0)
+        centre.peers.arrived(peer, "nowhere", Report(peer, NONE, "nowhere"), 0)
+        await asyncio.sleep(0.5)
+        assert [kind for kind, _ in cell.told if kind == "dropped"] == ["dropped", "dropped"]
+        await cell.stop()
+
+    run_in_virtual_time(main())
+
+
+def test_a_vote_of_who_was_not_asked_counts_for_nobody() -> None:
+    coordinator = Coordinator(ONE_ROBOT)
+    name, participants = next((t, c) for t, c in coordinator.participants.items() if len(c) == 2)
+    asked = [
+        effect
+        for controller in participants
+        for effect in coordinator.receive(Report(controller, Readiness(1, frozenset({name}))))
+        if isinstance(effect, VoteRequest)
+    ]
+    number = asked[0].round
+    stranger = next(s.name for s in ONE_ROBOT.subnets if s.name not in participants)
+    coordinator.receive(Vote(stranger, number, frozenset(), NONE))
+    coordinator.receive(Vote(participants[0], number, frozenset({name}), NONE))
+    assert not coordinator.rounds[number].decided
+    coordinator.receive(Vote(participants[1], number, frozenset({name}), NONE))
+    assert coordinator.rounds[number].committed == name
