@@ -35,12 +35,14 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from functools import partial
 from typing import Final, Protocol
+from weakref import WeakSet
 
 from aiohttp import web
 from aiohttp.http_exceptions import HttpProcessingError
 from aiohttp.typedefs import Handler, Middleware
 
 from firable.executor.loopback import is_loopback
+from firable.executor.operating.door import CONNECTIONS_MAX, Door, listening_at
 from firable.executor.operating.own_certificate import fault_of, fault_of_authority, unloaded
 from firable.executor.operating.situation import Situation, State
 from firable.executor.protocol.commands import SAID, Answer
@@ -52,6 +54,8 @@ METRICS_CONTENT_TYPE: Final = "text/plain; version=0.0.4; charset=utf-8"
 _SAID: Final = tuple(answer.value for answer in SAID.values())
 STRANGERS_MAX: Final = 100
 """So many lines of a trace tell of those who were not let in."""
+_LET_IN: Final = web.AppKey("let_in", WeakSet[asyncio.BaseTransport])
+"""The connections on which somebody was let in."""
 SHUTDOWN_SECONDS: Final = 1.0
 """So long what is being answered may take once the run is over; then the process ends, whatever a client does."""
 
@@ -198,20 +202,36 @@ async def serving(
 async def listening(app: web.Application, endpoint: Endpoint, strangers: Strangers | None = None) -> AsyncIterator[str]:
     """Serve an application for as long as the context lasts; gives the address, and raises `InputError` F5061."""
     complaints = logging.Logger("firable.endpoint")  # of its own: several in one process tell different runs
-    complaints.addHandler(_Complaints(strangers or Strangers()))
+    strangers = strangers or Strangers()
+    complaints.addHandler(_Complaints(strangers))
+    let_in = WeakSet[asyncio.BaseTransport]()
+    app[_LET_IN] = let_in
     runner = web.AppRunner(app, access_log=None, logger=complaints, shutdown_timeout=SHUTDOWN_SECONDS)
     await runner.setup()
+    made = runner.server
+    if made is None:
+        raise AssertionError("a runner that is set up has a server")
+    too_many = f"more than {CONNECTIONS_MAX} connections at once"
+    door = Door(made, endpoint.tls, let_in, partial(strangers.turned_away, too_many))
+    keepers: list[asyncio.Task[None]] = []
+    sockets = []
     try:
-        site = web.TCPSite(runner, endpoint.host, endpoint.port, ssl_context=endpoint.tls)
         try:
-            await site.start()
+            sockets = await listening_at(endpoint.host, endpoint.port)
         except OSError as error:
             message = f"nothing can be served at {endpoint.host}:{endpoint.port}: {reason(error)}"
             raise InputError([Diagnostic("F5061", message, "name another port; 0 takes a free one")]) from None
-        host, port = runner.addresses[0][:2]
+        keepers += [asyncio.create_task(door.keep(one)) for one in sockets]
+        host, port = sockets[0].getsockname()[:2]
         shown = f"[{host}]" if ":" in host else host
         yield f"{'http' if endpoint.tls is None else 'https'}://{shown}:{port}"
     finally:
+        for keeper in keepers:
+            keeper.cancel()
+        await asyncio.gather(*keepers, return_exceptions=True)
+        for one in sockets:
+            one.close()
+        await door.close()
         await runner.cleanup()
 
 
@@ -226,6 +246,8 @@ def admission(endpoint: Endpoint, public: Collection[str], strangers: Strangers 
             return web.json_response(
                 {"error": "who are you? show the token"}, status=401, headers={"WWW-Authenticate": "Bearer"}
             )
+        if request.path not in public and _LET_IN in request.app and request.transport is not None:
+            request.app[_LET_IN].add(request.transport)
         return await handler(request)
 
     return who_may
