@@ -10,11 +10,13 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
+from urllib.parse import urlsplit
 
 import click
 
 from firable.cli.choice import OneOf
 from firable.cli.files import READ
+from firable.nets.source import printable
 
 if TYPE_CHECKING:
     from firable.executor import Host
@@ -28,6 +30,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 _READING: Final = ("situation", "metrics")
 _COMMANDS: Final = (*_READING, "pause", "resume", "step", "stop", "stop-at-end", "emergency-stop", "reset", "say")
 _SECONDS: Final = 10.0
+_TOLD: Final = {"state": str, "message": str, "marking": list, "blocked": list}
+"""What is in every answer of a run, but for its figures."""
 NO_BROWSER: Final = "FIRABLE_NO_BROWSER"
 """The variable of the environment by which an address is told and no browser opened."""
 
@@ -157,6 +161,11 @@ def operate(
         raise click.UsageError(
             f"'{address}' is no address: write it as the run has printed it, with http:// or https://"
         )
+    if token_file is not None and not _is_hidden(address):
+        raise click.UsageError(
+            f"the token would be shown to the network on the way to '{printable(address)}': beyond this host a run is "
+            "served by https:// alone; come through a tunnel to 127.0.0.1, or write https://"
+        )
     if (cert or ca) and not address.startswith("https://"):
         raise click.UsageError("--cert and --ca are of https:// addresses")
     said = _said(command, what)
@@ -169,6 +178,17 @@ def operate(
     answer, is_refused = asyncio.run(ask(address.rstrip("/"), command, said, caller))
     click.echo(answer, nl=command != "metrics")
     return 1 if is_refused else 0
+
+
+def _is_hidden(address: str) -> bool:
+    """Whether nobody on the way to an address reads what is shown there."""
+    from firable.executor.loopback import is_loopback
+
+    try:
+        host = urlsplit(address).hostname
+    except ValueError:  # what is no address is told as such where it is asked
+        return True
+    return address.startswith("https://") or host is None or is_loopback(host)
 
 
 def _said(command: str, what: str | None) -> dict[str, str]:
@@ -209,7 +229,12 @@ async def ask(address: str, command: str, said: dict[str, str], caller: Caller) 
         async with (
             aiohttp.ClientSession(timeout=timeout) as session,
             session.request(
-                method, f"{address}/{command}", params=said, headers=headers, ssl=caller.tls or True
+                method,
+                f"{address}/{command}",
+                params=said,
+                headers=headers,
+                ssl=caller.tls or True,
+                allow_redirects=False,  # no run sends its operator elsewhere
             ) as answer,
         ):
             if answer.status == 401:
@@ -217,14 +242,14 @@ async def ask(address: str, command: str, said: dict[str, str], caller: Caller) 
             if answer.status != 200:
                 raise refusal(f"{address} answers {answer.status}", hint)
             if command == "metrics":
-                return await answer.text(), False
+                return "".join(f"{printable(line)}\n" for line in (await answer.text()).splitlines()), False
             told = await answer.json()
-            if not isinstance(told, dict) or not told.keys() >= {"state", "message", "marking", "blocked"}:
+            if not isinstance(told, dict) or not all(isinstance(told.get(key), kind) for key, kind in _TOLD.items()):
                 raise refusal(f"{address} answers as no run does", hint)
             return _told(told), bool(told.get("refused"))
     except aiohttp.InvalidURL:
         raise click.UsageError(f"'{address}' is no address: write it as the run has printed it") from None
-    except (aiohttp.ClientError, OSError, TimeoutError) as error:
+    except (aiohttp.ClientError, OSError, TimeoutError, ValueError, RecursionError) as error:  # no JSON, no text
         raise unreached(
             address, error, has_authority=caller.has_authority, has_certificate=caller.has_certificate
         ) from None
@@ -235,8 +260,9 @@ def _told(answer: dict[str, Any]) -> str:
     if "fired" in answer and not answer.get("refused"):
         lines.insert(0, f"fired {answer['fired']}" if answer["fired"] else "no transition has fired")
     lines[:0] = [f"refused: {why}" for why in answer.get("refused", ())]
-    lines.append(f"  tokens on {', '.join(answer['marking'])}")
-    return "\n".join([*lines, *(f"  {blocked}" for blocked in answer["blocked"])])
+    lines.append(f"  tokens on {', '.join(map(str, answer['marking']))}")
+    # Whatever answers there, the terminal is the operator's.
+    return "\n".join(map(printable, [*lines, *(f"  {blocked}" for blocked in answer["blocked"])]))
 
 
 def _token_kept(path: Path) -> str:
@@ -271,7 +297,6 @@ def _token_read(path: Path) -> str:
 
 def _open_to_all(path: Path) -> InputError:
     from firable.nets.diagnostics import Diagnostic, InputError
-    from firable.nets.source import printable
 
     name = printable(str(path))
     hint = f"`chmod o-r {name}`; where somebody may have read it, remove it: the run makes another"
@@ -280,7 +305,6 @@ def _open_to_all(path: Path) -> InputError:
 
 def _file_refusal(code: str, path: Path, error: Exception) -> InputError:
     from firable.nets.diagnostics import Diagnostic, InputError
-    from firable.nets.source import printable
 
     reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
     return InputError([Diagnostic(code, f"{printable(str(path))}: no token: {reason}", "name the file of the token")])

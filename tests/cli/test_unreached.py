@@ -91,11 +91,50 @@ def test_certificates_that_are_not_believed_are_told_apart(tmp_path: Path) -> No
 def test_what_answers_and_is_no_run_is_told_so() -> None:
     assert refused(Caller("x"), answer=[1]).startswith("answers as no run does")
     assert refused(Caller("x"), answer={"state": "well"}).startswith("answers as no run does")
+    unlike = {"state": "well", "message": "", "marking": 7, "blocked": []}
+    assert refused(Caller("x"), answer=unlike).startswith("answers as no run does")
+
+    def babble(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writer.write(b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nContent-Length: 3\r\n\r\n{{{")
+
+    assert refused(Caller("x"), serve=babble).startswith("cannot be reached: what answers there is no run")
+
+    def elsewhere(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writer.write(b"HTTP/1.1 307 Gone\r\nLocation: http://127.0.0.1:9/\r\nContent-Length: 0\r\n\r\n")
+
+    assert refused(Caller("x"), serve=elsewhere).startswith("answers 307")
 
     def greet(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         writer.write(b"SSH-2.0-sshd\r\n")
 
     assert refused(Caller("x"), serve=greet).startswith("cannot be reached: what answers there is no run")
+
+
+def test_what_answers_does_not_command_the_terminal_of_who_asks() -> None:
+    escape = "\x1b]0;owned\x07\n"
+    said = {"state": f"well{escape}", "message": escape, "marking": [escape], "blocked": [escape], "refused": [escape]}
+
+    async def pause(_: web.Request) -> web.Response:
+        return web.json_response(said)
+
+    async def metrics(_: web.Request) -> web.Response:
+        return web.Response(text=f"a 1\n{escape}")
+
+    async def main() -> None:
+        app = web.Application()
+        app.router.add_post("/pause", pause)
+        app.router.add_get("/metrics", metrics)
+        runner = web.AppRunner(app)
+        await runner.setup()
+        try:
+            await web.TCPSite(runner, "127.0.0.1", 0).start()
+            for command in ("pause", "metrics"):
+                told, _ = await ask(f"http://127.0.0.1:{runner.addresses[0][1]}", command, {}, Caller("x"))
+                assert all(line.isprintable() for line in told.split("\n"))
+        finally:
+            await runner.cleanup()
+
+    asyncio.run(main())
 
 
 @pytest.mark.parametrize("asks", [True, False])
@@ -124,9 +163,12 @@ def test_ones_own_certificate_that_has_expired_is_told_before_it_is_shown(
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["http://nowhere.invalid:1"], "http://nowhere.invalid:1 cannot be reached: no host of that name is known"),
+        (["https://nowhere.invalid:1"], "https://nowhere.invalid:1 cannot be reached: no host of that name is known"),
         (["http://127.0.0.1:9"], "http://127.0.0.1:9 cannot be reached: nobody serves there"),
         (["http://127.0.0.1:99999"], "'http://127.0.0.1:99999' is no address"),
+        (["http://10.0.0.5:8080"], "the token would be shown to the network on the way to 'http://10.0.0.5:8080'"),
+        (["http://127.0.0.1.cell.example"], "the token would be shown to the network"),
+        (["http://127.0.0.1@10.0.0.5:8080"], "the token would be shown to the network"),
         (["http://127.0.0.1:9", "--ca", "ca.pem"], "--cert and --ca are of https:// addresses"),
     ],
 )
