@@ -32,13 +32,17 @@ def write_whole(path: str | Path, data: bytes | str) -> None:
         target = Path(os.path.realpath(path))
         _refuse_what_is_no_file(str(path), target)
         unfinished = target.with_name(f".{os.urandom(8).hex()}.unfinished")
+        mode = None
+        with suppress(FileNotFoundError):  # who could read what stood there can read what does, and nobody else
+            mode = stat.S_IMODE(target.stat().st_mode)
         try:
-            with unfinished.open("xb") as stream:
+            flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
+            with os.fdopen(os.open(unfinished, flags, 0o666 if mode is None else 0o600), "wb") as stream:
                 stream.write(content)
                 stream.flush()
                 os.fsync(stream.fileno())
-            with suppress(FileNotFoundError):  # whoever could read what stood there can read what does now
-                unfinished.chmod(stat.S_IMODE(target.stat().st_mode))
+            if mode is not None:
+                unfinished.chmod(mode)
             unfinished.replace(target)
         finally:  # nothing is left behind, whatever ended the writing
             with suppress(OSError, ValueError):

@@ -1,6 +1,7 @@
 """A file is written whole or not at all, and every failure is the one diagnostic F1017."""
 
 import os
+import stat
 from pathlib import Path
 
 import pytest
@@ -32,6 +33,18 @@ def test_a_new_file_has_the_permissions_of_any_new_file(tmp_path: Path) -> None:
     (tmp_path / "other").touch()
     write_whole(tmp_path / "file", b"")
     assert (tmp_path / "file").stat().st_mode == (tmp_path / "other").stat().st_mode
+
+
+def test_what_replaces_a_private_file_is_never_open_to_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    modes: list[int] = []
+    monkeypatch.setattr(os, "fsync", lambda descriptor: modes.append(stat.S_IMODE(os.fstat(descriptor).st_mode)))
+    for mode in (0o600, 0o640, 0o444):
+        path = tmp_path / f"{mode:o}"
+        path.write_text("old")
+        path.chmod(mode)
+        write_whole(path, "new")
+        assert stat.S_IMODE(path.stat().st_mode) == mode
+    assert modes == [0o600] * 3
 
 
 @pytest.mark.parametrize("name", ["", ".", "..", "/", "folder", "folder/", "new/", "none/file", "file/x", "a\0b"])
