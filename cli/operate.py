@@ -19,6 +19,7 @@ from firable.cli.files import READ
 from firable.nets.source import printable
 
 if TYPE_CHECKING:
+    from firable.cli.view.site import Opening
     from firable.executor import Host
     from firable.executor.operating.control import Page
     from firable.executor.operating.service import Service
@@ -74,20 +75,26 @@ class ServeOptions:
         tls = None if self.serve_tls is None else tls_context(*self.serve_tls, self.operators)
         token = new_token() if self.token_file is None else _token_kept(Path(self.token_file))
         endpoint = Endpoint(host.strip("[]"), int(port), token, tls)
-        return Service(endpoint, partial(self._served, token), partial(_page, bundle=bundle, plant=plant))
+        opening = None
+        if self.open:
+            from firable.cli.view.site import Opening
 
-    def _served(self, token: str, address: str) -> None:
+            opening = Opening(token)
+        page = partial(_page, bundle=bundle, plant=plant, opening=opening)
+        return Service(endpoint, partial(self._served, token, opening), page)
+
+    def _served(self, token: str, opening: Opening | None, address: str) -> None:
         who = f"the token {token}" if self.token_file is None else f"the token in {self.token_file}"
         if self.operators is not None:
             who = f"a certificate of the authority in {self.operators}"
         click.echo(f"operate this run at {address} with {who}", err=True)
-        if self.open:
+        if opening is not None:
             from firable.cli.view.command import show
 
-            show(f"{address}/#token={token}", open_it=not os.environ.get(NO_BROWSER))
+            show(address, opening, open_it=not os.environ.get(NO_BROWSER))
 
 
-def _page(host: Host, bundle: str, plant: PlantModel | None) -> Page:
+def _page(host: Host, bundle: str, plant: PlantModel | None, opening: Opening | None) -> Page:
     from firable.cli.pictures import kept_layout
     from firable.cli.text import show_diagnostic
     from firable.cli.view.drawing import PLAIN, Look
@@ -100,7 +107,7 @@ def _page(host: Host, bundle: str, plant: PlantModel | None) -> Page:
         look = PLAIN
         for one in error.diagnostics:
             show_diagnostic(replace(one, severity=Severity.WARNING))
-    return LivePage(host, plant, look)
+    return LivePage(host, plant, look, opening)
 
 
 def serve_options(command: F) -> F:

@@ -12,6 +12,7 @@ from firable.cli.options import load_net, net_argument, plant_found
 
 if TYPE_CHECKING:
     from firable.cli.view.editing import Editing
+    from firable.cli.view.site import Opening
     from firable.nets.loading import Loaded
     from firable.nets.machines.plant_file import PlantModel
 
@@ -111,18 +112,20 @@ async def _served(editing: Editing, port: int, *, open_it: bool) -> None:
     import asyncio
 
     from firable.cli.view.playing import application
+    from firable.cli.view.site import Opening
     from firable.executor.operating.control import Endpoint, listening, new_token
 
     endpoint = Endpoint("127.0.0.1", port, new_token())
-    async with listening(application(editing.playing, endpoint, editing.routes()), endpoint) as address:
-        show(f"{address}/#token={endpoint.token}", open_it=open_it)
+    opening = Opening(endpoint.token)
+    async with listening(application(editing.playing, endpoint, editing.routes(), opening), endpoint) as address:
+        show(address, opening, open_it=open_it)
         await asyncio.Event().wait()
 
 
-def show(address: str, *, open_it: bool) -> None:
-    """Tell the address of a page, and open a browser on it if that is wanted."""
-    click.echo(f"see it at {address}", err=True)
+def show(address: str, opening: Opening, *, open_it: bool) -> None:
+    """Tell where a page is that is served at an address, and open a browser on it if that is wanted."""
+    click.echo(f"see it at {address}/#token={opening.token}", err=True)
     if open_it:
         import webbrowser
 
-        webbrowser.open(address)
+        webbrowser.open(f"{address}{opening.path}")

@@ -30,7 +30,7 @@ from firable.cli.view.drawing import PLAIN, Look, Pictures
 from firable.cli.view.lanes import Lanes
 from firable.cli.view.moment import Moment
 from firable.cli.view.scene import Stage
-from firable.cli.view.site import PUBLIC, answering, file_routes
+from firable.cli.view.site import PUBLIC, Opening, answering, file_routes
 from firable.cli.view.top_view import top_of
 from firable.cli.view.votes import awaited, votes
 from firable.executor import Host
@@ -51,8 +51,11 @@ HAPPENED_MAX: Final = 300
 class LivePage:
     """The page of a host, or of a whole run."""
 
-    def __init__(self, host: Host, plant: PlantModel | None = None, look: Look = PLAIN) -> None:
+    def __init__(
+        self, host: Host, plant: PlantModel | None = None, look: Look = PLAIN, opening: Opening | None = None
+    ) -> None:
         self.host = host
+        self.opening = opening
         self.owners = None if host.is_whole else frozenset(host.controllers)
         self.net = host.net if self.owners is None else own_part(host.net, self.owners)
         self.player = TokenPlayer.of(self.net)
@@ -68,11 +71,13 @@ class LivePage:
     @property
     def public(self) -> Collection[str]:
         """The paths that anybody may read."""
-        return PUBLIC
+        return PUBLIC if self.opening is None else {*PUBLIC, self.opening.path}
 
     def routes(self) -> Iterable[web.AbstractRouteDef]:
         """The files of the page, what it shows at first, and the stream that it follows."""
         yield from file_routes()
+        if self.opening is not None:
+            yield from self.opening.routes()
         yield web.get("/api/page", answering(self.page))
         yield web.post("/api/picture", answering(self.pictures.picture))
         yield web.get("/api/events", self.stream)

@@ -17,7 +17,7 @@ from firable.cli.view.drawing import PLAIN, Look, Pictures
 from firable.cli.view.moment import Moment
 from firable.cli.view.runs import Run, checked, verdict_json
 from firable.cli.view.scene import Stage
-from firable.cli.view.site import BODY_BYTES_MAX, PUBLIC, answering, file_routes, refusal
+from firable.cli.view.site import BODY_BYTES_MAX, PUBLIC, Opening, answering, file_routes, refusal
 from firable.cli.view.top_view import top_of
 from firable.executor.operating.control import Endpoint, admission
 from firable.nets.loading import Loaded
@@ -150,8 +150,12 @@ class Playing:
         raise refusal("the page asks for a run that is not known")
 
 
-def application(playing: Playing, endpoint: Endpoint, more: Iterable[web.AbstractRouteDef] = ()) -> web.Application:
-    """A net to play with, as an application."""
-    app = web.Application(middlewares=[admission(endpoint, playing.public)], client_max_size=BODY_BYTES_MAX)
-    app.router.add_routes([*playing.routes(), *more])
+def application(
+    playing: Playing, endpoint: Endpoint, more: Iterable[web.AbstractRouteDef] = (), opening: Opening | None = None
+) -> web.Application:
+    """A net to play with, as an application; a browser may be led to it by `opening`."""
+    first = [] if opening is None else list(opening.routes())
+    public = playing.public if opening is None else {*playing.public, opening.path}
+    app = web.Application(middlewares=[admission(endpoint, public)], client_max_size=BODY_BYTES_MAX)
+    app.router.add_routes([*playing.routes(), *first, *more])
     return app

@@ -4,6 +4,9 @@ They are served to anybody who reaches this address, which only this host does, 
 comes to the page in the fragment of its address (`#token=...`), which browsers send to nobody, and is shown with each
 request as `executor/operating/control.py` demands; a cookie would be sent by any page that posts here.
 
+The address with which a browser is started stands among the processes of this host, for everybody to read and as long
+as the browser runs. So that one holds no token: it leads to the page once, to whoever comes first (`Opening`).
+
 The page may load nothing from elsewhere and be framed by nobody. Rejected: files with the hash of their content in
 their names, which live long in a cache. Here they come over loopback, and what is built can be compared by its names.
 """
@@ -11,6 +14,7 @@ their names, which live long in a cache. Here they come over loopback, and what 
 from __future__ import annotations
 
 import json
+import secrets
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from importlib.resources import files
 from typing import Any, Final
@@ -40,6 +44,25 @@ BODY_BYTES_MAX: Final = 4_000_000
 
 Answer = Callable[[dict[str, Any]], Any]
 """What answers a request: from its JSON object to JSON data."""
+
+
+class Opening:
+    """An address that leads one browser, once, to the page with its token."""
+
+    def __init__(self, token: str) -> None:
+        self.token = token
+        self.path = f"/open/{secrets.token_urlsafe(24)}"
+        self.is_used = False
+
+    def routes(self) -> Iterable[web.AbstractRouteDef]:
+        """The route of that address."""
+        yield web.get(self.path, self.lead, allow_head=False)
+
+    async def lead(self, _: web.Request) -> web.Response:
+        """Lead on whoever is the first to come; whoever comes then may enter the token."""
+        is_first, self.is_used = not self.is_used, True
+        where = f"/#token={self.token}" if is_first else "/"
+        return web.Response(status=303, headers={**_HEADERS, "Location": where})
 
 
 def file_routes() -> Iterable[web.AbstractRouteDef]:
