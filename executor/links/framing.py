@@ -26,6 +26,8 @@ PAYLOAD_BYTES_MAX: Final = 4096
 _HEAD: Final = struct.Struct(">BBBBH")
 _SUM: Final = struct.Struct(">I")
 _STUFFED_BYTES_MAX: Final = (_HEAD.size + PAYLOAD_BYTES_MAX + _SUM.size) * 255 // 254 + 2
+FRAME_BYTES_MAX: Final = _STUFFED_BYTES_MAX + 2
+"""The longest frame as it is on the line."""
 
 
 class Kind(IntEnum):

@@ -29,7 +29,7 @@ import serial
 from pydantic import TypeAdapter, ValidationError
 
 from firable.executor.links.encoding import EncodingError, pack, unpack
-from firable.executor.links.framing import PAYLOAD_BYTES_MAX, Frame, FrameReader, Kind, pack_frame
+from firable.executor.links.framing import FRAME_BYTES_MAX, PAYLOAD_BYTES_MAX, Frame, FrameReader, Kind, pack_frame
 from firable.executor.links.link import Greeting, LinkListener, cannot_open, come_back_without, has_failed, objection
 from firable.executor.links.standing import Standing
 from firable.executor.links.storages import Memory, Met, Storage
@@ -233,15 +233,20 @@ class SerialLink:
                     continue
 
     async def _answer(self, answered: asyncio.Future[Frame], poll_bytes: int) -> Frame | None:
-        """The answer to the last poll: it must begin in time, and is waited for as long as bytes come."""
+        """The answer to the last poll: it must begin in time, and is waited for while bytes come and a frame lasts.
+
+        What comes for longer is no answer: a converter that is broken, say, and drives the line for ever.
+        """
         loop = asyncio.get_running_loop()
         waiting = self.answer_seconds + poll_bytes * _BITS_A_BYTE / self.baud
+        frame_seconds = FRAME_BYTES_MAX * _BITS_A_BYTE / self.baud
+        until = loop.time() + waiting + max(self.lease_seconds, 2 * frame_seconds)
         self.byte_seconds = float("-inf")
         while True:
             done, _ = await asyncio.wait({answered}, timeout=waiting)
             if done:
                 return answered.result()
-            waiting = self.byte_seconds + self.answer_seconds - loop.time()
+            waiting = min(self.byte_seconds + self.answer_seconds, until) - loop.time()
             if waiting <= 0:
                 answered.cancel()
                 return None

@@ -5,6 +5,7 @@ import os
 import pty
 import random
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -139,6 +140,24 @@ def test_a_dead_station_does_not_keep_the_others_waiting() -> None:
                 while len(counting.polls) < 40:
                     await asyncio.sleep(0.05)
                 assert counting.polls.count(2) > 20  # of three that are dead, each is asked one time in five
+
+    asyncio.run(main())
+
+
+def test_who_drives_the_line_for_ever_keeps_nobody_from_being_told_lost() -> None:
+    async def main() -> None:
+        async with over_a_serial_line() as rig:
+            here, there = rig.link(Greeting("d", (COORDINATOR,))), rig.link(Greeting("d", ("robot",)))
+            async with asyncio.timeout(PATIENCE_SECONDS), running(here) as centre, running(there):
+                await centre.until_told(("connected", "robot"))
+                rig.cut()
+                while ("lost", "robot") not in centre.told:
+                    with suppress(BlockingIOError):
+                        os.write(rig.ports[0][0], b"\x55" * 20)
+                    await asyncio.sleep(0.005)
+                rig.mend()
+                centre.told.clear()
+                await centre.until_told(("connected", "robot"))
 
     asyncio.run(main())
 
