@@ -29,6 +29,7 @@ from firable.executor import Host, Operator
 from firable.executor.operating.aside import UntoldError, aside
 from firable.executor.operating.restart import uncertain
 from firable.executor.protocol.commands import SAID
+from firable.nets.source import one_line
 
 _PROMPT = "  [Enter] next, [r] run on, [e] stop at the end of the cycle, [s] stop now: "
 _TAKE_UP = "  [r] take the run up, [s] stop now: "
@@ -201,7 +202,7 @@ class _Person:
             if host.at_rest:
                 return False
             await asyncio.sleep(_POLL_SECONDS)
-        description = host.net.transition(fired).description
+        description = one_line(host.net.transition(fired).description)
         self.say(f"{host.now_seconds():8.1f} s  {fired}  {description}")
         return True
 

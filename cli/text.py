@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from firable.cli.story import cures_told, waits_told
+from firable.nets.source import one_line
 
 if TYPE_CHECKING:
     from firable.cli.report import Report
@@ -113,7 +114,7 @@ def show_verdicts(net: Net, verdicts: Sequence[Verdict], *, verbose: bool = Fals
 def verdict_line(verdict: Verdict, width: int = 0, *, fold: bool = False) -> str:
     """The line of a verdict: symbol, word, name, statement; with `fold` a long statement goes on under itself."""
     symbol, word, colour = mark(verdict)
-    said = verdict.statement
+    said = one_line(verdict.statement)
     if fold:
         hang = len(f"  {symbol} {word:<8}  {verdict.name:<{width}}  ")
         lines = wrap(said, max(columns() - hang, 40), break_long_words=False, break_on_hyphens=False)
@@ -144,13 +145,17 @@ def reasons(
 ) -> Iterator[str]:
     """What is told below the line of a verdict: how far was looked, about what, the witness, the hint with its code.
 
-    `told` holds the sequences that were told before, by the verdict that told them.
+    `told` holds the sequences that were told before, by the verdict that told them. Each is one line, whatever the net
+    file says in the words that it is free to choose.
     """
+    return map(one_line, _reasons(net, verdict, {} if told is None else told, verbose=verbose))
+
+
+def _reasons(net: Net, verdict: Verdict, told: dict[tuple[object, ...], str], *, verbose: bool) -> Iterator[str]:
     from firable.nets.rules import hints_of
     from firable.nets.verdict import NOTHING
 
     status = verdict.status.value
-    told = {} if told is None else told
     if verdict.expected is not None and verdict.outcome.value == "proved":
         yield f"{status}, as expected"
         if not verbose:
@@ -226,7 +231,7 @@ def told_steps(net: Net, firings: Sequence[Sequence[str]], first: int = 1) -> It
     for k, fired in enumerate(firings, start=first):
         for i, name in enumerate(fired):
             number = f"{k:>3}." if i == 0 else "   +"
-            yield f"{number} {name:<{width}}  {net.transition(name).description}".rstrip()
+            yield f"{number} {name:<{width}}  {one_line(net.transition(name).description)}".rstrip()
 
 
 _OUTCOMES: Final = {"violated": "changed", "unknown": "unknown though expected", "proved": "as expected"}

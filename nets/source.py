@@ -24,6 +24,8 @@ EXCERPT_CHARACTERS_MAX: Final = 100
 _PASSWORD: Final = re.compile(r"""(\bpassword["']?\s*:\s*)("(?:[^"\\]|\\.)*"?|'[^']*'?|[^\s'"].*)""")
 """A password in YAML or JSON; what is printed may go anywhere, into the log of a CI run most of all."""
 
+_BREAK: Final = re.compile(r"\s*[\t-\r\x1c-\x1e\x85\u2028\u2029]\s*")
+
 
 @dataclass(frozen=True)
 class Source:
@@ -75,6 +77,15 @@ def printable(text: str) -> str:
     'a b·[31m'
     """
     return "".join(c if c.isprintable() else " " if c == "\t" else "·" for c in text)
+
+
+def one_line(text: str) -> str:
+    """The text on one line, and printable: what stands in a file must not look like what is said of it.
+
+    >>> one_line("  1. G1  hand over\\n::error::all is well")
+    '  1. G1  hand over ::error::all is well'
+    """
+    return text if text.isprintable() else printable(_BREAK.sub(" ", text))
 
 
 def quoted(text: str) -> str:

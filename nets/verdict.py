@@ -14,6 +14,8 @@ from decimal import Decimal
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, Final
 
+from firable.nets.source import one_line, quoted
+
 if TYPE_CHECKING:
     from firable.nets.changes import Change
 
@@ -61,7 +63,7 @@ class Wait:
         'hand.full (hand with a part) waits in put for table.free, which comes from table.taken by clear'
         """
         what = f"{self.lacks}, which comes from {self.holder} by" if self.wanted else f"{self.lacks} to be emptied by"
-        place = f"{self.place} ({description})" if description else self.place
+        place = f"{self.place} ({one_line(description)})" if description else self.place
         return f"{place} waits in {self.transition} for {what} {' and '.join(self.by)}"
 
     def to_json(self) -> dict[str, Any]:
@@ -240,7 +242,7 @@ def held_to(expected: Iterable[Expectation], verdicts: Iterable[Verdict]) -> tup
         raise InputError(
             Diagnostic(
                 "F2030",
-                f"`expect` names the verdict '{name}', which is none of this net",
+                f"`expect` names the verdict {quoted(name)}, which is none of this net",
                 did_you_mean(name, sorted(known)) + "write the name as `firable check` prints it",
                 ("expect", name),
             )

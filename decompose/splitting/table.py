@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from firable.nets.decomposition import Coordinated
+from firable.nets.source import one_line
 
 _GAP = 3
 
@@ -27,7 +28,7 @@ def table_text(table: Sequence[Coordinated]) -> str:
     >>> print(table_text(split(net).table), end="")
     G1: t0-1, t1-11   hand over
     """
-    rows = [(row.at, row.name, ", ".join(part.name for part in row.parts), row.description) for row in table]
+    rows = [(row.at, row.name, ", ".join(part.name for part in row.parts), one_line(row.description)) for row in table]
     width_name = max((len(name) for _, name, _, _ in rows), default=0) + 1
     width_parts = max((len(parts) for _, _, parts, _ in rows), default=0) + _GAP
     lines: dict[str | None, list[str]] = {None: []}
