@@ -212,8 +212,10 @@ class Diagnostic:
         return CODES[self.code]
 
     def __str__(self) -> str:
+        from firable.nets.source import one_line  # which reads files, and says what is wrong with them
+
         where = f"{self.span}: " if self.span else ""
-        lines = [f"{where}{self.severity}[{self.code}]: {self.message}"]
+        lines = [one_line(f"{where}{self.severity}[{self.code}]: {self.message}")]
         if self.span and self.span.excerpt:
             gutter = f"{self.span.line:5d} | "
             offset = self.span.column - self.span.excerpt_column
@@ -221,7 +223,7 @@ class Diagnostic:
             marker = " " * (len(gutter) + offset) + "^" * length
             lines += [gutter + self.span.excerpt, marker]
         if self.hint:
-            lines.append(f"  hint: {self.hint}")
+            lines.append(one_line(f"  hint: {self.hint}"))
         return "\n".join(lines)
 
 

@@ -48,3 +48,19 @@ def test_words_that_are_free_make_no_line_of_a_report(
     assert "\x1b[2J" not in told
     said = [line.strip() for line in told.splitlines()]
     assert not [line for line in said if line.startswith(("::stop-commands", "✓ proved    deadlock-free"))]
+
+
+def test_names_of_files_and_of_signals_make_no_line_of_an_error(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    file = Path("a\n::stop-commands::x\x1b[2J.firable.yaml")
+    file.write_text("firable: 1\ncell: [\n")
+    assert main(["check", str(file)]) == 2
+    trace = Path("run.trace")
+    head = '{"firable_trace": 1, "net": "one-robot", "digest": "", "discipline": "interleaving", "signals": true}'
+    trace.write_text(f'{head}\n{{"at": 1.0, "signal": "a\\n::stop-commands::x\\u001b[2J", "value": 1}}\n')
+    assert main(["timeline", str(trace), "--net", "catalogue:one_robot", "-o", "run.svg"]) == 2
+    told = "".join(capfd.readouterr())
+    assert "\x1b[2J" not in told
+    assert not [line for line in told.splitlines() if line.strip().startswith("::")]
