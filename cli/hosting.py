@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -44,6 +44,7 @@ class HostOptions:
     listen: tuple[str, ...]
     join: tuple[str, ...]
     tls: tuple[str, str, str] | None
+    certified: Mapping[str, tuple[str, ...]]
     serial: str | None
     baud: int
     lease: float
@@ -68,6 +69,7 @@ class HostOptions:
             "--listen": self.listen,
             "--join": self.join,
             "--tls": self.tls,
+            "--certified": self.certified,
             "--serial": self.serial,
             "--baud": is_given("baud"),
             "--lease": is_given("lease"),
@@ -85,6 +87,22 @@ def _addresses(_context: click.Context, option: click.Parameter, addresses: tupl
             known = "write tcp/HOST:PORT or tls/HOST:PORT, such as tcp/127.0.0.1:7447"
             raise click.UsageError(f"{option.opts[0]} {printable(address)}: this is no address; {known}")
     return addresses
+
+
+def _certified(
+    _context: click.Context, option: click.Parameter, said: tuple[str, ...]
+) -> Mapping[str, tuple[str, ...]]:
+    """Which controllers the host of each common name runs."""
+    found: dict[str, tuple[str, ...]] = {}
+    for one in said:
+        name, _, controllers = one.rpartition("=")
+        named = tuple(filter(None, controllers.split(",")))
+        if not name or not named:
+            raise click.UsageError(f"{option.opts[0]} {printable(one)}: write NAME=CONTROLLER, as in plc1=robot,mc")
+        if name in found:
+            raise click.UsageError(f"{option.opts[0]} {printable(name)} stands twice: name all its controllers at once")
+        found[name] = named
+    return found
 
 
 def host_options(command: F) -> F:
@@ -117,6 +135,13 @@ def host_options(command: F) -> F:
                 type=(READ, READ, READ),
                 metavar="CA CERT KEY",
                 help="The files of the site's authority, and of this host's certificate and key, for tls/ addresses.",
+            ),
+            click.option(
+                "--certified",
+                metavar="NAME=CONTROLLERS",
+                multiple=True,
+                callback=_certified,
+                help="Let only the certificate with this common name be that of these controllers; for each host one.",
             ),
             click.option(
                 "--serial", metavar="PORT", help="Reach the others over a serial line, polled by the coordinator."
@@ -226,7 +251,7 @@ def _link(bundle: Bundle, machines: tuple[str, ...], options: HostOptions) -> tu
     from firable.executor.operating.hosting import Network, SerialLine, make_link
 
     if options.serial is not None:
-        if options.listen or options.join or options.tls:
+        if options.listen or options.join or options.tls or options.certified:
             raise click.UsageError("--serial is one link, and --listen, --join and --tls are of another: give one")
         return make_link(bundle, machines, SerialLine(options.serial, options.baud, options.lease)), ()
     if is_given("baud"):
@@ -238,7 +263,10 @@ def _link(bundle: Bundle, machines: tuple[str, ...], options: HostOptions) -> tu
         raise click.UsageError(f"{secured[0]} asks for certificates: name those of this host with --tls CA CERT KEY")
     if options.tls is not None and not secured:
         raise click.UsageError("--tls is for tls/ addresses, and without one nothing is encrypted: write tls/HOST:PORT")
-    link = make_link(bundle, machines, Network(options.listen, options.join, options.tls, options.lease))
+    if options.certified and len(secured) < len(options.listen) + len(options.join):
+        raise click.UsageError("--certified is of tls/ addresses alone: over tcp/ nobody shows a certificate")
+    network = Network(options.listen, options.join, options.tls, options.certified, options.lease)
+    link = make_link(bundle, machines, network)
     from firable.executor.links.zenoh_link import open_to_the_network
 
     return link, open_to_the_network(options.listen)

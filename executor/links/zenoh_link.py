@@ -22,7 +22,9 @@ a pattern at once, and such a key has other parts than the one that it was subsc
 
 Nothing listens unless an address is given, and multicast is off. Beyond one machine, `tls/` addresses with certificates
 on both sides (`Certificates`) keep strangers out; plain `tcp/` beyond loopback lets anybody on the network speak.
-Whoever has a certificate of the site may be any of its machines.
+Whoever has a certificate of the site may be any of its machines, unless it is said which certificate is whose
+(`Certificates.of`): then Zenoh itself lets nobody claim machines, or say something in their names, over a connection
+with another certificate than that of their host.
 
 Zenoh calls back on threads of its own. Where the event loop sleeps, and is one that lends itself (`lending.py`),
 messages are acted upon there and then; a loop that is at work is woken once for all that comes before it looks, for to
@@ -37,9 +39,9 @@ import asyncio
 import json
 import re
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from typing import Any, Final
 from urllib.parse import quote, unquote
@@ -65,6 +67,7 @@ _NAMELESS: Final = "%"  # which no name is quoted to
 _WITH: Final = "-"  # which is in no identity
 _AND: Final = ","  # which is in no quoted name
 _REST: Final = "**"
+_SAYING: Final = ("put", "delete", "liveliness_token")
 _WILD: Final = "*"  # which is in no key of ours, and in each that stands for several
 _VERSION: Final = re.compile("[0-9]{1,9}", re.ASCII)
 _OVERHEAD_BYTES_MAX: Final = 1 << 16
@@ -78,6 +81,8 @@ class Certificates:
     authority: str
     certificate: str
     key: str
+    of: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """For each common name in a certificate the machines of the host that has it; without any, each may be all."""
 
 
 class ZenohLink:
@@ -126,7 +131,8 @@ class ZenohLink:
         asked = f"{QUESTION} (this one {here})"
         if self.certificates is None:
             return asked
-        return f"{asked} is the certificate of each of the authority that the other names with --tls, and not expired?"
+        asked = f"{asked} is the certificate of each of the authority that the other names with --tls, and not expired?"
+        return f"{asked} is it made out to the name that --certified says?" if self.certificates.of else asked
 
     async def run(self, listener: LinkListener) -> None:
         """Serve until cancelled; raises `InputError` F5021 where an address cannot be listened at."""
@@ -221,6 +227,8 @@ class ZenohLink:
                 "verify_name_on_connect": True,
                 "close_link_on_expiration": True,
             }
+            if self.certificates.of:
+                settings["access_control"] = _access(self.certificates.of)
         configuration = zenoh.Config()
         for key, value in settings.items():
             configuration.insert_json5(key, json.dumps(value))
@@ -340,6 +348,37 @@ class ZenohLink:
             self.damaged += 1
             return ()
         return ((peer, receiver, message, age),)
+
+
+def _access(of: Mapping[str, tuple[str, ...]]) -> dict[str, Any]:
+    """The rules by which Zenoh takes from each certificate what is its own: claims of its machines, and their words."""
+    anybody = ["firable/*/*/heard/*/by/*/*/*", "firable/*/*/stands/*/*"]
+    asking = ["declare_subscriber", "declare_liveliness_subscriber", "liveliness_query"]
+    rules = [
+        _rule("out", "egress", ["**"], [*_SAYING, *asking, "reply"]),
+        _rule("asking", "ingress", ["firable/**"], [*asking, "reply"]),
+        _rule("anybody", "ingress", anybody, _SAYING),
+    ]
+    subjects: list[dict[str, Any]] = [{"id": "all"}]
+    policies = [{"rules": ["out", "asking", "anybody"], "subjects": ["all"]}]
+    for number, (name, machines) in enumerate(of.items()):
+        own = [f"firable/*/*/alive/{_all_spelled(machines)}/*"]
+        own += [f"firable/*/*/to/*/*/from/{_spelled(machine)}/*" for machine in machines]
+        rules.append(_rule(f"host{number}", "ingress", own, _SAYING))
+        subjects.append({"id": f"host{number}", "cert_common_names": [name]})
+        policies.append({"rules": [f"host{number}"], "subjects": [f"host{number}"]})
+    return {
+        "enabled": True,
+        "default_permission": "deny",
+        "rules": rules,
+        "subjects": subjects,
+        "policies": policies,
+    }
+
+
+def _rule(name: str, flow: str, keys: Sequence[str], messages: Sequence[str]) -> dict[str, Any]:
+    allowed = {"flows": [flow], "key_exprs": list(keys), "messages": list(messages)}
+    return {"id": name, "permission": "allow", **allowed}
 
 
 def open_to_the_network(addresses: Sequence[str]) -> tuple[Diagnostic, ...]:

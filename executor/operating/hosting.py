@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import ssl
 import time
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Final
@@ -18,7 +19,7 @@ from firable.executor.drivers.bound import BoundDriver
 from firable.executor.drivers.driver import Drivers
 from firable.executor.drivers.rivals import listen_first
 from firable.executor.journal.sqlite_journal import refuse_taken_over
-from firable.executor.links.link import Greeting, Link
+from firable.executor.links.link import Greeting, Link, called
 from firable.executor.operating.conduct import UNATTENDED, Conduct, Watch
 from firable.executor.operating.host import Host
 from firable.executor.operating.local_monitor import LocalMonitor
@@ -37,6 +38,8 @@ from firable.nets.net import Net
 from firable.nets.source import printable, read_bytes
 
 CERTIFICATE_BYTES_MAX: Final = 1_000_000
+NAMELESS: Final = "coordinator"
+"""What the coordinator of a net that names none is called where a host is to be named."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +50,8 @@ class Network:
     join: tuple[str, ...] = ()
     certificates: tuple[str, str, str] | None = None
     """The files of the authority, of the certificate and of its key."""
+    certified: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """For each common name in a certificate the controllers of the host that has it, if these are to be told apart."""
     lease_seconds: float = 1.0
 
 
@@ -117,6 +122,7 @@ def make_link(bundle: Bundle, machines: tuple[str, ...], way: Network | SerialLi
     """The link of a host; raises `ModuleNotFoundError` where the extra `zenoh` or `serial` is not installed.
 
     On a serial line controllers speak to the master alone: `InputError` F5021 where only some coordinators are there.
+    F2005 where it is said whose a certificate is, and not of all hosts.
     F1001 or F1003 where a certificate cannot be read, F5062 where it is none, or the key not its own: Zenoh would look
     at them at a connection, and only try again.
     """
@@ -137,7 +143,8 @@ def make_link(bundle: Bundle, machines: tuple[str, ...], way: Network | SerialLi
     certificates = None
     if way.certificates is not None:
         _demand_certificates(*way.certificates, serves=bool(way.listen), joins=bool(way.join))
-        certificates = Certificates(*way.certificates)
+        certificates = Certificates(*way.certificates, _certified(bundle, machines, way.certified))
+        greeting = Greeting(bundle.digest, _in_order(bundle, machines))  # the one order in which they are claimed
     return ZenohLink(
         greeting, listen=way.listen, join=way.join, certificates=certificates, lease_seconds=way.lease_seconds
     )
@@ -163,6 +170,35 @@ def _demand_certificates(authority: str, certificate: str, key: str, *, serves: 
         if fault := fault_of(certificate, key, is_server=is_server):
             message = f"the certificate {printable(certificate)} cannot be used: {printable(fault)}"
             raise InputError([Diagnostic("F5062", message, "renew it, or set the clock of this host")])
+
+
+def _in_order(bundle: Bundle, machines: Collection[str] | None = None) -> tuple[str, ...]:
+    """All machines of a bundle, or these, in the order of the net."""
+    known = (*coordinators(bundle.decomposition), *(controller.name for controller in bundle.net.controllers))
+    return tuple(name for name in known if machines is None or name in machines)
+
+
+def _certified(
+    bundle: Bundle, here: Collection[str], certified: Mapping[str, tuple[str, ...]]
+) -> Mapping[str, tuple[str, ...]]:
+    """For each common name all machines of its host; raises `InputError` F2005 where one elsewhere has none, or two."""
+    if not certified:
+        return {}
+    is_nameless = bundle.net.coordinator is None and NAMELESS not in {c.name for c in bundle.net.controllers}
+    found: dict[str, tuple[str, ...]] = {}
+    for name, controllers in certified.items():
+        holds = is_nameless and NAMELESS in controllers
+        own = [controller for controller in controllers if not (holds and controller == NAMELESS)]
+        found[name] = _in_order(bundle, machines_of(bundle.net, own, coordinator=holds))
+    named = Counter(machine for machines in found.values() for machine in machines)
+    for machine in _in_order(bundle):
+        if named[machine] > 1 or (machine not in here and not named[machine]):
+            said = "of two certificates" if named[machine] else "of no certificate"
+            hint = "name with --certified each controller once, with all of its host, as in plc1=robot,mc"
+            if is_nameless:
+                hint += f"; that which --coordinator holds is named {NAMELESS}"
+            raise InputError([Diagnostic("F2005", f"{called(machine)} is said to be {said}", hint)])
+    return found
 
 
 def own_net(decomposition: Decomposition, machines: Sequence[str]) -> Net:

@@ -6,6 +6,7 @@ import socket
 from contextlib import AsyncExitStack
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 import zenoh
@@ -160,7 +161,7 @@ def test_no_key_of_a_stranger_ends_a_link(key: str) -> None:
             await centre.until_told(("refused", "stranger"))
             assert stranger.session is not None
             stranger.session.put(key, b"nothing of ours")
-            token = stranger.session.liveliness().declare_token(key)
+            token: Any = stranger.session.liveliness().declare_token(key)
             token.undeclare()
             async with running(ZenohLink(ROBOT, join=[at])):  # it is heard behind that
                 await centre.until_told(("connected", "robot"))
@@ -244,3 +245,38 @@ def test_the_session_of_a_link_is_closed_with_it() -> None:
             return link.session
 
     assert asyncio.run(main()).is_closed()
+
+
+def test_who_has_the_certificate_of_another_host_is_heard_as_that_one_alone(tmp_path: Path) -> None:
+    """Neither may it claim machines of others, nor say something in the name of one that is connected."""
+    site = Site(tmp_path / "site")
+    of = {"plc 1": (COORDINATOR,), "plc 2": ("robot",), "plc 3": ("mc", "coordinator cell_a")}
+
+    async def main() -> None:
+        at = f"tls/127.0.0.1:{free_port()}"
+        here = ZenohLink(CENTRE, listen=[at], certificates=replace(site.host("plc 1"), of=of))
+        there = ZenohLink(ROBOT, join=[at], certificates=replace(site.host("plc 2"), of=of))
+        other = replace(ROBOT, names=("mc", "coordinator cell_a"))
+        forger = ZenohLink(other, join=[at], certificates=replace(site.host("plc 3"), of=of))
+        claims = ZenohLink(replace(ROBOT, names=("conveyor",)), join=[at], certificates=site.host("plc 4"))
+        second = ZenohLink(replace(ROBOT, names=("robot",)), join=[at], certificates=site.host("plc 3 too"))
+        async with asyncio.timeout(PATIENCE_SECONDS), running(here) as centre, running(there) as robot:
+            await centre.until_told(("connected", "robot"))
+            await robot.until_told(("connected", COORDINATOR))
+            async with running(forger), running(claims), running(second):
+                await centre.until_told(("connected", "mc"), ("connected", "coordinator cell_a"))
+                assert forger.session is not None
+                forged = pack(0, Report("robot", Readiness(1, frozenset({"forged"}))))
+                to = f"firable/{PROTOCOL_VERSION}/d1/to/%/{here.identity}"
+                forger.session.put(f"{to}/from/robot/{there.identity}", forged)
+                forger.session.put("firable/**", forged)
+                while len(centre.messages) < 2:
+                    there.send("robot", COORDINATOR, Report("robot", Readiness(7, frozenset())))
+                    forger.send("mc", COORDINATOR, Report("mc", Readiness(7, frozenset())))
+                    await asyncio.sleep(0.3)
+                said = {m for _, _, m in centre.messages}
+                assert said == {Report(name, Readiness(7, frozenset())) for name in ("robot", "mc")}
+                assert not [peer for _, peer in centre.told if peer == "conveyor"]
+                assert "refused" not in {kind for kind, _ in centre.told}
+
+    asyncio.run(main())
