@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import sys
+
 import click
 
 
@@ -14,5 +17,7 @@ def lsp() -> int:
     """
     from firable.cli.lsp.server import server
 
-    server.start_io()
+    # pygls closes what it has written to, and the program writes there, too, before it ends.
+    with os.fdopen(os.dup(sys.stdout.fileno()), "wb") as told:
+        server.start_io(stdout=told)
     return 0

@@ -1,6 +1,8 @@
 """The language server as an editor meets it: over pipes, with the messages of the protocol."""
 
 import asyncio
+import json
+import subprocess
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
@@ -366,3 +368,18 @@ def test_names_and_symbols_are_offered_and_columns_are_those_of_the_client(tmp_p
         assert q.range.start.character == before + 1  # the robot is two units of UTF-16
 
     within(tmp_path / "cell.firable.yaml", act)
+
+
+def test_a_server_that_is_told_to_end_ends_well_and_says_nothing_more() -> None:
+    asked = [
+        {"id": 1, "method": "initialize", "params": {"processId": None, "rootUri": None, "capabilities": {}}},
+        {"id": 2, "method": "shutdown"},
+        {"method": "exit"},
+    ]
+    texts = [json.dumps({"jsonrpc": "2.0", **one}).encode() for one in asked]
+    said = b"".join(b"Content-Length: %d\r\n\r\n%s" % (len(text), text) for text in texts)
+    ended = subprocess.run(
+        [sys.executable, "-m", "firable.cli", "lsp"], input=said, capture_output=True, timeout=60, check=False
+    )
+    assert (ended.returncode, ended.stderr) == (0, b"")
+    assert b'"id": 2' in ended.stdout or b'"id":2' in ended.stdout
