@@ -33,6 +33,8 @@ _COMMANDS: Final = (*_READING, "pause", "resume", "step", "stop", "stop-at-end",
 _SECONDS: Final = 10.0
 _TOLD: Final = {"state": str, "message": str, "marking": list, "blocked": list}
 """What is in every answer of a run, but for its figures."""
+_TOKEN_CHARACTERS_MAX: Final = 4000
+"""More than a line of HTTP takes; nothing that never ends is a token."""
 NO_BROWSER: Final = "FIRABLE_NO_BROWSER"
 """The variable of the environment by which an address is told and no browser opened."""
 
@@ -279,7 +281,7 @@ def _token_kept(path: Path) -> str:
 
     if stands(path):
         token = _token_read(path)
-        if path.stat().st_mode & stat.S_IROTH:
+        if path.stat().st_mode & (stat.S_IROTH | stat.S_IWOTH):
             raise _open_to_all(path)
         return token
     token = new_token()
@@ -294,11 +296,14 @@ def _token_kept(path: Path) -> str:
 
 def _token_read(path: Path) -> str:
     try:
-        token = path.read_text(encoding="ascii").strip()
+        with path.open(encoding="ascii") as opened:
+            token = opened.read(_TOKEN_CHARACTERS_MAX + 1).strip()
     except (OSError, ValueError) as error:
         raise _file_refusal("F1001", path, error) from None
     if not token or not token.isprintable() or " " in token:
         raise _file_refusal("F1001", path, ValueError("it is empty" if not token else "it is not one word in one line"))
+    if len(token) > _TOKEN_CHARACTERS_MAX:
+        raise _file_refusal("F1001", path, ValueError(f"it has more than {_TOKEN_CHARACTERS_MAX} characters"))
     return token
 
 
@@ -306,8 +311,8 @@ def _open_to_all(path: Path) -> InputError:
     from firable.nets.diagnostics import Diagnostic, InputError
 
     name = printable(str(path))
-    hint = f"`chmod o-r {name}`; where somebody may have read it, remove it: the run makes another"
-    return InputError([Diagnostic("F5060", f"{name}: everybody on this host can read this token", hint)])
+    hint = f"`chmod o-rw {name}`; where somebody may have done that, remove it: the run makes another"
+    return InputError([Diagnostic("F5060", f"{name}: everybody on this host can read this token, or change it", hint)])
 
 
 def _file_refusal(code: str, path: Path, error: Exception) -> InputError:

@@ -371,7 +371,7 @@ def test_names_and_symbols_are_offered_and_columns_are_those_of_the_client(tmp_p
 
 
 def test_a_server_that_is_told_to_end_ends_well_and_says_nothing_more() -> None:
-    asked = [
+    asked: list[dict[str, Any]] = [
         {"id": 1, "method": "initialize", "params": {"processId": None, "rootUri": None, "capabilities": {}}},
         {"id": 2, "method": "shutdown"},
         {"method": "exit"},

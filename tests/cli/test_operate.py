@@ -176,16 +176,26 @@ def test_the_token_is_for_its_owner_alone_and_no_other_gets_in(
     assert [dict(note.data) for note in notes if note.note == "not let in"] == [{"what": "/stop", "by": "127.0.0.1"}]
 
 
-def test_a_token_that_everybody_on_the_host_can_read_opens_no_endpoint(tmp_path: Path) -> None:
+def test_a_token_that_everybody_on_the_host_can_read_or_change_opens_no_endpoint(tmp_path: Path) -> None:
     token = tmp_path / "token"
     token.write_text(new_token())
     for mode in (0o600, 0o640):  # a group may be that of the operators
         token.chmod(mode)
         assert ServeOptions("127.0.0.1:0", token_file=str(token)).service("cell.bundle") is not None
-    token.chmod(0o644)
-    with pytest.raises(InputError, match="everybody on this host can read this token") as refused:
-        ServeOptions("127.0.0.1:0", token_file=str(token)).service("cell.bundle")
-    assert refused.value.diagnostics[0].code == "F5060"
+    for mode in (0o644, 0o602):
+        token.chmod(mode)
+        with pytest.raises(InputError, match="everybody on this host can read this token, or change it") as refused:
+            ServeOptions("127.0.0.1:0", token_file=str(token)).service("cell.bundle")
+        assert refused.value.diagnostics[0].code == "F5060"
+
+
+@pytest.mark.parametrize("token", ["/dev/zero", "long"])
+def test_what_is_longer_than_any_token_is_none(token: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = Path(token) if token.startswith("/") else tmp_path / token
+    if not file.exists():
+        file.write_text("a" * 5000)
+    assert main(["operate", "http://127.0.0.1:9", "stop", "--token-file", str(file)]) == 2
+    assert "error[F1001]" in capsys.readouterr().err
 
 
 def test_who_may_operate_is_told_as_it_is_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
