@@ -12,7 +12,7 @@ import gc
 import traceback
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -83,6 +83,7 @@ def run_to_the_end(host: Host, *, virtual: bool = False) -> Situation:
     else:
         page = None if service.page is None else service.page(host)  # before the loop begins, which it would hold up
         work = _serving(host, service, figures, page)
+    allow_all_descriptors()
     guard = Guard(host.patience.seconds)
     try:
         with _short_collections(), asyncio.Runner(loop_factory=partial(_loop_for, host)) as runner:
@@ -93,6 +94,21 @@ def run_to_the_end(host: Host, *, virtual: bool = False) -> Situation:
     finally:
         guard.end()
     return ended
+
+
+def allow_all_descriptors() -> None:
+    """Let this process have as many files and connections as the system gives it, and not the thousand of a shell.
+
+    Where there are none left no device is reached again; and Zenoh, which anybody can have open one for each connection
+    to its address, before any certificate is shown, hears nobody any more until it is started again.
+    """
+    try:
+        import resource
+    except ModuleNotFoundError:  # a system without such limits
+        return
+    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with suppress(OSError, ValueError):  # a system may say that there is no bound, and allow less
+        resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
 
 
 def _loop_for(host: Host) -> asyncio.AbstractEventLoop:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import resource
 import stat
 import subprocess
 import sys
@@ -264,3 +265,23 @@ def test_what_cannot_be_served_is_refused_before_the_run_begins(
 ) -> None:
     assert main(["run", str(bundle), *arguments]) == 2
     assert told in capsys.readouterr().err
+
+
+def test_a_run_takes_all_the_descriptors_that_it_may_have(bundle: Path) -> None:
+    """A shell gives a thousand, and whoever opens so many connections to a host has it hear nobody any more."""
+    hard = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
+    script = (
+        f"import resource, sys; resource.setrlimit(resource.RLIMIT_NOFILE, (100, {hard}));"
+        "from firable.cli.main import main; sys.exit(main(sys.argv[1:]))"
+    )
+    arguments = ["run", str(bundle), "--speed", "1", "--workpieces", "50", "--serve", "127.0.0.1:0"]
+    process = subprocess.Popen(
+        [sys.executable, "-c", script, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    try:
+        assert process.stderr is not None
+        process.stderr.readline()  # it serves
+        assert resource.prlimit(process.pid, resource.RLIMIT_NOFILE) == (hard, hard)
+    finally:
+        process.kill()
+        process.communicate()
