@@ -163,7 +163,7 @@ def test_the_page_of_a_run_follows_the_layout_beside_its_bundle_and_a_wrong_one_
 
     def picture() -> str:
         host = Host(decomposition, DryRunDriver(decomposition.subnets, 0.0), Recorder(decomposition.net, "", None))
-        page = _page(host, str(tmp_path / "cell.bundle"), None)
+        page = _page(host, str(tmp_path / "cell.bundle"), None, None)
         assert isinstance(page, LivePage)
         return str(asyncio.run(page.pictures.picture({}))["picture"])
 
