@@ -29,7 +29,10 @@ class Between:
         self.first_round: Mapping[str, int] = {name: number for number, name in enumerate(names)}
         self.stride = len(names)
         transitions: dict[tuple[str, str], set[str]] = defaultdict(set)
+        self.decided: Mapping[str, set[str]] = {name: set() for name in names}
+        """For each coordinator, the transitions that it decides."""
         for row in decomposition.coordinated:
+            self.decided[coordinator_at(row.at)].add(row.name)
             for part in row.parts:
                 transitions[coordinator_at(row.at), part.controller].add(row.name)
         self.transitions = {pair: frozenset(found) for pair, found in transitions.items()}
@@ -46,8 +49,9 @@ class Between:
             case VoteRequest():
                 return theirs.issuperset(message.transitions) and self._is_round(message.coordinator, message.round)
             case Decision():
-                is_theirs = message.committed is None or message.committed in theirs
-                return is_theirs and self._is_round(message.coordinator, message.round)
+                # Who was asked for what lost the arbitration is told the winner, in which it may take no part.
+                is_its = message.committed is None or message.committed in self.decided[message.coordinator]
+                return is_its and self._is_round(message.coordinator, message.round)
         promised = message.promised if isinstance(message, Vote) else _NOTHING
         return promised <= theirs and message.readiness.transitions <= theirs
 

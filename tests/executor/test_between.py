@@ -56,6 +56,27 @@ def test_a_coordinator_speaks_of_its_own_rounds_alone() -> None:
         assert between.has(VoteRequest("machine_a", number, (), 0, 0, 0, CELL_A)) is is_its
 
 
+def test_who_lost_the_arbitration_is_told_who_won_though_it_takes_no_part_in_that() -> None:
+    coordinator, between = Coordinator(ONE_ROBOT), Between(ONE_ROBOT)
+    group = frozenset({"G5", "G8"})
+    asked = {c: group & {t for t in group if c in coordinator.participants[t]} for c in coordinator.ready}
+    told = [e for c in ("system", "mc", "conveyor") for e in coordinator.receive(Report(c, Readiness(1, asked[c])))]
+    told += coordinator.receive(Report("robot", Readiness(1, asked["robot"])))
+    for controller, transitions in asked.items():
+        told += coordinator.receive(Vote(controller, 0, transitions, NONE))
+    orders = [message for message in told if isinstance(message, Decision)]
+    winner = orders[0].committed
+    assert winner in group
+    assert any(winner not in asked[message.controller] for message in orders)
+    assert all(between.has(message) for message in told if isinstance(message, VoteRequest | Decision))
+
+
+def test_a_coordinator_orders_what_it_decides_alone() -> None:
+    own = Between(TWO_CELLS).first_round[CELL_A]
+    assert Between(TWO_CELLS).has(Decision("machine_a", own, "taken_a", 0, 0, 0, CELL_A))
+    assert not Between(TWO_CELLS).has(Decision("machine_a", own, "taken_b", 0, 0, 0, CELL_A))
+
+
 def test_a_host_that_says_what_nobody_knows_ends_no_other_one(tmp_path: Path) -> None:
     async def main() -> None:
         cell = Cell(tmp_path)
