@@ -2,8 +2,10 @@
 
 Whoever reaches the address of an endpoint can open connections, and say nothing on them. Each takes a descriptor of the
 process that runs a cell, of which there are few: without one it reaches no device again, and no operator gets in with
-his stop. So there are `CONNECTIONS_MAX`, and the one more has the place of the oldest of those on which nobody was let
-in, be it in the middle of its handshake. Whoever may come shows that with the first that he says.
+his stop. So there are `CONNECTIONS_MAX`, and the one more has the place of one of those on which nobody was let in, be
+it in the middle of its handshake: of the oldest from where most of them come, so that whoever comes fast from one
+address closes his own, and not that of an operator whose line is slow. Whoever may come shows that with the first that
+he says.
 
 Connections are taken one in a turn of the event loop, which is that of the run. The servers of asyncio take a hundred,
 and where the process has no descriptor left they tell that so often, and for ever. Rejected: a time within which one
@@ -16,6 +18,7 @@ import asyncio
 import errno
 import socket
 import ssl
+from collections import Counter
 from collections.abc import Callable, Container
 from typing import Final
 
@@ -44,8 +47,8 @@ class Door:
         self.tls = tls
         self.let_in = let_in
         self.too_many = too_many
-        self.there: list[_Coming] = []
-        """The connections that are there, in the order in which they came."""
+        self.there: dict[_Coming, str] = {}
+        """The connections that are there, in the order in which they came, and the address that each came from."""
 
     async def keep(self, listening: socket.socket) -> None:
         """Take who comes, until cancelled."""
@@ -58,13 +61,14 @@ class Door:
             except OSError:  # the process has no descriptor left, or the system no memory
                 await asyncio.sleep(_AGAIN_SECONDS)
                 continue
-            self.there = [one for one in self.there if _is_there(one)]
+            whence = str(address[0])
+            self.there = {one: its for one, its in self.there.items() if _is_there(one)}
             if len(self.there) >= CONNECTIONS_MAX:
-                self.too_many(str(address[0]))
+                self.too_many(whence)
                 self._make_room()
             coming = loop.create_task(loop.connect_accepted_socket(self.made, accepted, ssl=self.tls))
             coming.add_done_callback(_transport)  # a handshake that fails is nobody's to tell
-            self.there.append(coming)
+            self.there[coming] = whence
             await asyncio.sleep(0)
 
     async def close(self) -> None:
@@ -75,9 +79,11 @@ class Door:
         await asyncio.gather(*left, return_exceptions=True)
 
     def _make_room(self) -> None:
-        strangers = (one for one in self.there if _transport(one) not in self.let_in)
-        leaving = next(strangers, self.there[0])
-        self.there.remove(leaving)
+        strangers = {one: its for one, its in self.there.items() if _transport(one) not in self.let_in}
+        crowd = Counter(strangers.values())
+        # The oldest of the most numerous, for `max` gives the first; where all were let in, the oldest of these.
+        leaving = max(strangers, key=lambda one: crowd[strangers[one]], default=next(iter(self.there)))
+        del self.there[leaving]
         leaving.cancel()
         if (transport := _transport(leaving)) is not None:
             transport.abort()

@@ -101,6 +101,31 @@ def test_who_was_let_in_stays() -> None:
     asyncio.run(main())
 
 
+def test_who_comes_fast_from_one_address_closes_his_own_and_not_that_of_an_operator_who_is_slow() -> None:
+    async def main() -> None:
+        async with served(Run()) as url:
+            port = int(url.rpartition(":")[2])
+            reader, writer = await asyncio.open_connection("127.0.0.1", port, local_addr=("127.0.0.2", 0))
+            strangers = await come(url, 3 * CONNECTIONS_MAX)
+            writer.write(f"GET /situation HTTP/1.1\r\nHost: cell\r\nAuthorization: Bearer {TOKEN}\r\n\r\n".encode())
+            assert await reader.readline() == b"HTTP/1.1 200 OK\r\n"
+            assert strangers
+
+    asyncio.run(main())
+
+
+def test_an_operator_gets_in_where_all_who_are_there_were_let_in() -> None:
+    async def main() -> None:
+        async with served(Run()) as url, ClientSession(connector=TCPConnector(limit=0)) as session:
+            saying = f"GET /situation HTTP/1.1\r\nHost: cell\r\nAuthorization: Bearer {TOKEN}\r\n\r\n".encode()
+            for reader, _ in (there := await come(url, CONNECTIONS_MAX, saying)):
+                assert await reader.readline() == b"HTTP/1.1 200 OK\r\n"
+            assert await asked(session, url) == 200
+            assert len(there) == CONNECTIONS_MAX
+
+    asyncio.run(main())
+
+
 def test_a_handshake_that_does_not_go_on_makes_room(tmp_path: Path) -> None:
     async def main() -> None:
         host = Site(tmp_path / "site").host("cell")
