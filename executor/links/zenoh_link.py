@@ -212,6 +212,7 @@ class ZenohLink:
             "transport/link/tx/lease": round(self.lease_seconds * 1000),
             "transport/link/tx/keep_alive": 4,
             "transport/link/rx/max_message_size": MESSAGE_BYTES_MAX + _OVERHEAD_BYTES_MAX,
+            "transport/shared_memory/enabled": False,  # in which a process of the same system sends any size
             # A connection that was begun while the line was down must not hold up the next for ten seconds.
             "transport/unicast/open_timeout": round(_OPENING_SECONDS * 1000),
             "transport/unicast/accept_timeout": round(_OPENING_SECONDS * 1000),

@@ -196,6 +196,37 @@ def test_a_link_takes_no_message_that_is_larger_than_any_of_ours() -> None:
     assert MESSAGE_BYTES_MAX < size < 2 * MESSAGE_BYTES_MAX
 
 
+def test_a_process_of_the_same_system_sends_no_larger_one_either() -> None:
+    """Zenoh shares memory with it, for all that is longer than some thousand bytes."""
+    sizes: list[int] = []
+
+    async def main() -> None:
+        at = f"tcp/127.0.0.1:{free_port()}"
+        here, stranger = ZenohLink(CENTRE, listen=[at]), zenoh.Config()
+        stranger.insert_json5("connect/endpoints", json.dumps([at]))
+        stranger.insert_json5("scouting/multicast/enabled", "false")
+        async with asyncio.timeout(PATIENCE_SECONDS), running(here):
+            while here.session is None:
+                await asyncio.sleep(0.02)
+            heard: Any = here.session.declare_subscriber(
+                "x", lambda sample: sizes.append(len(sample.payload.to_bytes()))
+            )
+            with await asyncio.to_thread(zenoh.open, stranger) as session:
+                while len(sizes) < 2:
+                    session.put("x", b"small")
+                    await asyncio.sleep(0.02)
+                for _ in range(20):  # it makes that memory when something is first to go there
+                    session.put("x", bytes(3 * MESSAGE_BYTES_MAX))
+                    await asyncio.sleep(0.05)
+                session.put("x", b"last one")
+                while 8 not in sizes:
+                    await asyncio.sleep(0.02)
+            heard.undeclare()
+
+    asyncio.run(main())
+    assert set(sizes) == {5, 8}
+
+
 def test_an_address_that_is_taken_is_refused() -> None:
     async def main() -> None:
         with socket.socket() as taken:
