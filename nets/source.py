@@ -25,6 +25,8 @@ _PASSWORD: Final = re.compile(r"""(\bpassword["']?\s*:\s*)("(?:[^"\\]|\\.)*"?|'[
 """A password in YAML or JSON; what is printed may go anywhere, into the log of a CI run most of all."""
 
 _BREAK: Final = re.compile(r"\s*[\t-\r\x1c-\x1e\x85\u2028\u2029]\s*")
+_BLANK: Final = re.compile(r"\s")
+"""One of any width, or at which no line is broken, as French has before a colon: Python calls it not printable."""
 
 
 @dataclass(frozen=True)
@@ -84,8 +86,10 @@ def one_line(text: str) -> str:
 
     >>> one_line("  1. G1  hand over\\n::error::all is well")
     '  1. G1  hand over ::error::all is well'
+    >>> one_line("poser\\u00a0: z.\\u202fB.")
+    'poser : z. B.'
     """
-    return text if text.isprintable() else printable(_BREAK.sub(" ", text))
+    return text if text.isprintable() else printable(_BLANK.sub(" ", _BREAK.sub(" ", text)))
 
 
 def quoted(text: str) -> str:
