@@ -133,6 +133,8 @@ class Peers:
         """What ends a host that can do nothing without those."""
         self.keep_due_seconds = 0.0
         """When ages that were heard are made durable by themselves."""
+        self.dropped: set[tuple[str, str]] = set()
+        """Of whom it was told that he said what is not his to say, and of which kind that was."""
         self.is_due = False
         """Whether all should have come by now."""
         self.timer: asyncio.TimerHandle | None = None
@@ -331,7 +333,9 @@ class Peers:
         is_its = (sender, receiver) == (way if isinstance(message, ToController) else way[::-1])
         if is_its and receiver in self.here and self.between.has(message):
             return True
-        self.told("dropped", f"{called(sender)} sent a {type(message).__name__} that is not its to send")
+        if (what := (sender, type(message).__name__)) not in self.dropped:  # no trace is its to fill
+            self.dropped.add(what)
+            self.told("dropped", f"{called(sender)} sent a {what[1]} that is not its to send")
         return False
 
     def connected(self, peer: str, storage: Storage) -> None:
@@ -364,6 +368,7 @@ class Peers:
 
     def lost(self, peer: str) -> None:
         """A peer can no longer be reached."""
+        self.dropped = {what for what in self.dropped if what[0] != peer}
         if peer in self.names:
             self.connected_to.discard(peer)
             self.standing_peers.pop(peer, None)

@@ -84,9 +84,27 @@ def test_a_host_that_says_what_nobody_knows_ends_no_other_one(tmp_path: Path) ->
         await asyncio.sleep(0.5)
         peer = next(name for name in sorted(centre.peers.connected_to) if name != TOP)
         centre.peers.arrived(peer, TOP, Report(peer, Readiness(1 << 62, OTHER)), 0)
-        centre.peers.arrived(peer, "nowhere", Report(peer, NONE, "nowhere"), 0)
+        centre.peers.arrived(peer, "nowhere", Vote(peer, 5, frozenset(), NONE, "nowhere"), 0)
         await asyncio.sleep(0.5)
         assert [kind for kind, _ in cell.told if kind == "dropped"] == ["dropped", "dropped"]
+        await cell.stop()
+
+    run_in_virtual_time(main())
+
+
+def test_a_host_that_goes_on_saying_it_fills_no_trace(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        centre = next(host for names, host in cell.hosts.items() if TOP in host.acts.coordinators)
+        await asyncio.sleep(0.5)
+        for last in (1000, 2000):
+            for number in range(last):
+                centre.peers.arrived("robot", TOP, Report("robot", Readiness((1 << 62) + number, OTHER)), 0)
+            await cell.kill(("robot",))  # it is told anew of who has come anew
+            cell.start(("robot",))
+            await asyncio.sleep(5.0)
+        told = [sentence for kind, sentence in cell.told if kind == "dropped"]
+        assert told == ["'robot' sent a Report that is not its to send"] * 2
         await cell.stop()
 
     run_in_virtual_time(main())
