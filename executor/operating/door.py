@@ -5,7 +5,7 @@ process that runs a cell, of which there are few: without one it reaches no devi
 his stop. So there are `CONNECTIONS_MAX`, and the one more has the place of one of those on which nobody was let in, be
 it in the middle of its handshake: of the oldest from where most of them come, so that whoever comes fast from one
 address closes his own, and not that of an operator whose line is slow. Whoever may come shows that with the first that
-he says.
+he says. Where nearly all were let in, the oldest of these leaves: a page that was forgotten, and comes again if not.
 
 Connections are taken one in a turn of the event loop, which is that of the run. The servers of asyncio take a hundred,
 and where the process has no descriptor left they tell that so often, and for ever. Rejected: a time within which one
@@ -24,6 +24,8 @@ from typing import Final
 
 CONNECTIONS_MAX: Final = 64
 """Operators, their browsers and Prometheus have a dozen."""
+COMING_MIN: Final = 16
+"""So many may be about to say who they are, or the few who come last would close each other's connections."""
 _BACKLOG: Final = 128
 """So many wait at the system until they are taken, and take no descriptor."""
 _AGAIN_SECONDS: Final = 1.0
@@ -80,9 +82,11 @@ class Door:
 
     def _make_room(self) -> None:
         strangers = {one: its for one, its in self.there.items() if _transport(one) not in self.let_in}
-        crowd = Counter(strangers.values())
-        # The oldest of the most numerous, for `max` gives the first; where all were let in, the oldest of these.
-        leaving = max(strangers, key=lambda one: crowd[strangers[one]], default=next(iter(self.there)))
+        if len(strangers) < COMING_MIN:
+            leaving = next(one for one in self.there if one not in strangers)
+        else:
+            crowd = Counter(strangers.values())
+            leaving = max(strangers, key=lambda one: crowd[strangers[one]])  # the oldest: `max` gives the first
         del self.there[leaving]
         leaving.cancel()
         if (transport := _transport(leaving)) is not None:

@@ -16,7 +16,7 @@ from support.certificates import Site
 
 from firable.executor.operating import door
 from firable.executor.operating.control import Endpoint, serving, tls_context
-from firable.executor.operating.door import CONNECTIONS_MAX
+from firable.executor.operating.door import COMING_MIN, CONNECTIONS_MAX
 from firable.executor.operating.situation import Situation, State
 
 TOKEN = "a-token-of-some-length"
@@ -114,14 +114,18 @@ def test_who_comes_fast_from_one_address_closes_his_own_and_not_that_of_an_opera
     asyncio.run(main())
 
 
-def test_an_operator_gets_in_where_all_who_are_there_were_let_in() -> None:
+def test_operators_get_in_where_all_who_are_there_were_let_in_and_more_than_one_comes() -> None:
     async def main() -> None:
-        async with served(Run()) as url, ClientSession(connector=TCPConnector(limit=0)) as session:
-            saying = f"GET /situation HTTP/1.1\r\nHost: cell\r\nAuthorization: Bearer {TOKEN}\r\n\r\n".encode()
+        saying = f"GET /situation HTTP/1.1\r\nHost: cell\r\nAuthorization: Bearer {TOKEN}\r\n\r\n".encode()
+        async with served(Run()) as url:
             for reader, _ in (there := await come(url, CONNECTIONS_MAX, saying)):
                 assert await reader.readline() == b"HTTP/1.1 200 OK\r\n"
-            assert await asked(session, url) == 200
-            assert len(there) == CONNECTIONS_MAX
+            late = await come(url, COMING_MIN)
+            await asyncio.sleep(0.1)
+            for reader, writer in late:
+                writer.write(saying)
+                assert await reader.readline() == b"HTTP/1.1 200 OK\r\n"
+            assert there
 
     asyncio.run(main())
 
