@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import os
 import subprocess
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
@@ -370,16 +371,34 @@ def test_names_and_symbols_are_offered_and_columns_are_those_of_the_client(tmp_p
     within(tmp_path / "cell.firable.yaml", act)
 
 
-def test_a_server_that_is_told_to_end_ends_well_and_says_nothing_more() -> None:
+def told_to_end() -> bytes:
     asked: list[dict[str, Any]] = [
         {"id": 1, "method": "initialize", "params": {"processId": None, "rootUri": None, "capabilities": {}}},
         {"id": 2, "method": "shutdown"},
         {"method": "exit"},
     ]
     texts = [json.dumps({"jsonrpc": "2.0", **one}).encode() for one in asked]
-    said = b"".join(b"Content-Length: %d\r\n\r\n%s" % (len(text), text) for text in texts)
+    return b"".join(b"Content-Length: %d\r\n\r\n%s" % (len(text), text) for text in texts)
+
+
+def test_a_server_that_is_told_to_end_ends_well_and_says_nothing_more() -> None:
     ended = subprocess.run(
-        [sys.executable, "-m", "firable.cli", "lsp"], input=said, capture_output=True, timeout=60, check=False
+        [sys.executable, "-m", "firable.cli", "lsp"], input=told_to_end(), capture_output=True, timeout=60, check=False
     )
     assert (ended.returncode, ended.stderr) == (0, b"")
     assert b'"id": 2' in ended.stdout or b'"id":2' in ended.stdout
+
+
+def test_a_server_whose_editor_is_gone_ends_and_complains_to_nobody() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    ended = subprocess.run(
+        [sys.executable, "-m", "firable.cli", "lsp"],
+        input=told_to_end(),
+        stdout=writing,
+        stderr=subprocess.PIPE,
+        timeout=60,
+        check=False,
+    )
+    os.close(writing)
+    assert (ended.returncode, ended.stderr) == (0, b"")
