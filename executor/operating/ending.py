@@ -18,7 +18,7 @@ from firable.executor.operating.situation import Blocked, Situation, State, bloc
 from firable.executor.operating.uncut import Patience, uncut
 from firable.executor.operating.watching import otherwise
 from firable.executor.protocol.token_player import TokenPlayer
-from firable.nets.net import Net, SignalKind
+from firable.nets.net import Marking, Net, SignalKind
 
 if TYPE_CHECKING:
     from firable.executor.operating.host import Host
@@ -189,7 +189,8 @@ def beginnings(net: Net) -> tuple[str, ...]:
 
     They are firable in the initial marking, and a sensor opens them, which sees the workpiece that has come; of a net
     in which none is, all that are firable there. One behind which no machine gets a command, as long as the others are
-    barred, brings no work: a key that holds the cell is obeyed until its end.
+    barred, and which can be taken back, brings no work: a key that holds the cell is obeyed until its end. A part that
+    waits for another one cannot go back, and with it the cell would never be as at the beginning.
 
     >>> from firable.nets.catalogue import catalogue_net
     >>> beginnings(catalogue_net("one_robot")), beginnings(catalogue_net("two_cells"))
@@ -199,34 +200,45 @@ def beginnings(net: Net) -> tuple[str, ...]:
     firable = [c.name for c in player.transitions.values() if c.openable and c.firable(initial, player.places)]
     sensors = {signal.name for signal in net.signals if signal.kind is SignalKind.SENSOR}
     seen = [name for name in firable if any(gate.signal in sensors for gate in net.transition(name).external)]
+    unseen = [name for name in firable if name not in seen]
     barred = list(seen)
     for name in seen:
         others = [each for each in barred if each != name]
-        if others and _is_without_commands(net, others):
+        if (others or unseen) and _brings_no_work(net, others or unseen):
             barred = others
-    return tuple(barred or firable)
+    return tuple(barred or unseen)
 
 
-def _is_without_commands(net: Net, barred: Collection[str]) -> bool:
-    """Whether no command can follow the initial marking, gates free, while these transitions fire no more.
+def _brings_no_work(net: Net, barred: Collection[str]) -> bool:
+    """Whether no command can follow the initial marking, gates free, while these transitions fire no more, and whatever
+    follows it leads back to it.
 
     Of more markings than are looked at it is believed that one can.
     """
     player = TokenPlayer.of(net)
     commanding = sum(1 << i for i, place in enumerate(net.places) if place.command is not None)
     free = [one for one in player.transitions.values() if one.openable and one.name not in barred]
-    found, open_ = {net.initial_marking}, [net.initial_marking]
-    while open_ and len(found) <= _LOOKED_AT:
+    before: dict[Marking, list[Marking]] = {net.initial_marking: []}
+    open_ = [net.initial_marking]
+    while open_:
         marking = open_.pop()
         for one in free:
             if one.firable(marking, player.places):
                 after = one.fire(marking) & player.places
                 if after & commanding & ~marking:
                     return False
-                if after not in found:
-                    found.add(after)
+                if after not in before:
+                    if len(before) > _LOOKED_AT:
+                        return False
+                    before[after] = []
                     open_.append(after)
-    return not open_
+                before[after].append(marking)
+    home, open_ = {net.initial_marking}, [net.initial_marking]
+    while open_:
+        new = set(before[open_.pop()]) - home
+        home |= new
+        open_ += new
+    return len(home) == len(before)
 
 
 def _nobody_waits(run: Host) -> bool:

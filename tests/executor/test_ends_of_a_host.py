@@ -9,12 +9,14 @@ from firable.decompose import split
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.links.link import COORDINATOR
+from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.ending import beginnings
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.situation import State
 from firable.executor.protocol.messages import VoteRequest
 from firable.nets.catalogue import catalogue_net
+from firable.nets.interchange import net_digest
 from firable.nets.net import Place
 from firable.nets.text import parse_net
 from firable.semantics.trace import Noted, read_trace
@@ -170,13 +172,54 @@ transitions:
 
 
 def test_an_end_of_the_cycle_bars_what_brings_work_and_not_the_key_that_holds_the_cell() -> None:
-    """What holds work up is obeyed to the end; of two that bring work together one is barred at least."""
+    """What holds work up is obeyed to the end; of two buttons that begin work together one is barred at least."""
     assert beginnings(parse_net(HELD)) == ("take",)
     two = HELD.replace(
         "  begin:",
         "  one: {to: line.doors, if: line.door}\n  two: {to: line.gates, if: line.gate}\n"
         "  both: {from: [line.doors, line.gates, robot.free], to: robot.taken}\n  begin:",
     )
-    assert beginnings(parse_net(two)) == ("take", "two")
+    assert beginnings(parse_net(two)) == ("take", "one", "two")
+    buttons = two.replace("  both:", "  let_go: {from: line.doors}\n  let_go_too: {from: line.gates}\n  both:")
+    assert beginnings(parse_net(buttons)) == ("take", "two")
+    by_itself = HELD.replace("if: [robot.part, line.running]", "if: line.running")
+    assert beginnings(parse_net(by_itself)) == ("take",)
     nothing = HELD.replace("send: {machine: R, command: WORK}, until: worked", "description: at work")
     assert beginnings(parse_net(nothing)) == ("take",)
+
+
+JOINING = """
+firable: 1
+cell: joining
+controllers:
+  left: {start: empty, inputs: there, places: {empty: , full: }}
+  right: {start: empty, inputs: there, places: {empty: , full: }}
+  robot:
+    start: free
+    places: {free: , join: {send: {machine: R, command: JOIN}, until: joined}}
+transitions:
+  from_left: {from: left.empty, to: left.full, if: left.there}
+  from_right: {from: right.empty, to: right.full, if: right.there}
+  join: {from: [left.full, right.full, robot.free], to: [left.empty, right.empty, robot.join]}
+  end: {from: robot.join, to: robot.free}
+"""
+
+
+def test_a_part_that_would_wait_for_another_one_comes_in_no_more_at_the_end_of_the_cycle() -> None:
+    net = parse_net(JOINING)
+    assert beginnings(net) == ("from_left", "from_right")
+
+    async def present(_: Host) -> None:
+        await asyncio.sleep(600)
+
+    async def main() -> None:
+        machine = DryRunDriver(split(net).subnets, 1.0, {"left.there": False, "right.there": False})
+        run = Host(split(net), machine, Recorder(net, net_digest(net), None), Conduct(operator=present))
+        ending = asyncio.create_task(run.main())
+        await asyncio.sleep(1)
+        run.signal("left.there", value=True, entry=None)
+        run.stop(at_end_of_cycle=True)
+        situation = await asyncio.wait_for(ending, 60)
+        assert (situation.state, situation.message) == (State.STOPPED, "stopped at the end of the cycle")
+
+    run_in_virtual_time(main())
