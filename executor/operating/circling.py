@@ -5,6 +5,8 @@ can be told apart of such a run is finite: the marking with its signals, and whe
 are told apart too, so one that comes, moves, is machined or leaves is always something new. When many firings on end
 have led to nothing that was not there before, more will not. Nothing is concluded as long as something is still to come
 that was under way when they began: a workpiece that arrives in an hour, a machine that takes long, another time limit.
+Nor before that has happened many times, since firings alone say little: beside a lamp that blinks, a motion of a minute
+that is in time once in four has hardly been tried when the lamp has made up the number.
 
 Rejected: to look for the very same moment, with all times in it. Where machines take now longer and now shorter it
 never comes again, and what the machines of the protocol remember would have to be compared as well. Rejected, too: so
@@ -27,6 +29,8 @@ if TYPE_CHECKING:
 
 FIRINGS_MAX: Final = 5_000
 """So many firings on end that lead to nothing new are a circle."""
+ROUNDS_MAX: Final = 300
+"""If meanwhile, so many times, all that was under way has come to its end."""
 KNOWN_MAX: Final = 100_000
 """So much is remembered of what was there; a circle that is larger is not noticed."""
 _TOLD_MAX: Final = 6
@@ -46,7 +50,9 @@ class Circling:
         """What has fired since the last firing that led to something new."""
         self.since_seconds = 0.0
         self.was_to_come: set[Hashable] = set()
-        """What was to come then."""
+        """What was to come when the round began."""
+        self.rounds = 0
+        """How many times since then all that was to come has come."""
 
     def seen(self, event: Event) -> None:
         """Take an event of the trace."""
@@ -62,15 +68,18 @@ class Circling:
             self.again.clear()
             return
         if not self.again:
-            self.since_seconds, self.was_to_come = event.at_seconds, set(self._to_come())
+            self.since_seconds, self.was_to_come, self.rounds = event.at_seconds, self._to_come(), 0
         self.again.update(event.transitions)
 
     def end_circle(self) -> None:
         """End a run that goes round in a circle, unless an operator may change that; by a fault, if work is left."""
         run = self.run
-        if self.again.total() < FIRINGS_MAX or run.operated or run.served or run.stopping:
+        if not self.again or run.operated or run.served or run.stopping:
             return
-        if not self.was_to_come.isdisjoint(self._to_come()):
+        if self.was_to_come.isdisjoint(to_come := self._to_come()):
+            self.was_to_come = to_come
+            self.rounds += 1
+        if self.again.total() < FIRINGS_MAX or self.rounds < ROUNDS_MAX:
             return
         if run.is_complete():
             stopping.end(run, f"all workpieces went through, and now {self._told()}")

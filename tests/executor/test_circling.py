@@ -73,6 +73,7 @@ HANGS = NeverCompletes("R", "MOVE", 1)
 @pytest.fixture(autouse=True)
 def _small_circles(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("firable.executor.operating.circling.FIRINGS_MAX", 200)
+    monkeypatch.setattr("firable.executor.operating.circling.ROUNDS_MAX", 60)
 
 
 def ran(text: str, *disturbances: Disturbance, every_s: int = 5, operator: Operator | None = None) -> RunReport:
@@ -99,6 +100,13 @@ def test_a_motion_that_is_late_each_time_and_tried_again_ends_the_run() -> None:
 def test_a_motion_that_is_late_nine_times_in_ten_comes_to_its_end() -> None:
     plant = parse_plant(PLANT.replace("takes_s: 1.5", "takes_s: 1.4, jitter_s: 0.5"))
     assert execute(split(parse_net(NET)), SimulatedCell(plant, workpieces=20)).state is State.DONE
+
+
+def test_a_slow_motion_that_is_late_three_times_in_four_comes_to_its_end_whatever_blinks_beside_it() -> None:
+    plant = parse_plant(PLANT.replace("takes_s: 1.5", "takes_s: 60, jitter_s: 30"))
+    report = execute(split(parse_net(with_lamp(", within: 45s"))), SimulatedCell(plant, workpieces=4))
+    assert report.delivered == (1, 2, 3, 4)
+    assert report.firings["again"] > 4
 
 
 def test_what_goes_round_when_all_workpieces_went_through_is_stopped_and_no_fault() -> None:
