@@ -460,8 +460,11 @@ def late_limits(model: PlantModel, net: Net) -> tuple[Diagnostic, ...]:
 
 
 def otherwise_than(sealed: PlantModel, model: PlantModel) -> tuple[Diagnostic, ...]:
-    """A warning (F5003) where a plant is not that with which a bundle was proved; no proof asks for its times."""
-    path = _difference(_untimed(sealed.model_dump(by_alias=True)), _untimed(model.model_dump(by_alias=True)), ())
+    """A warning (F5003) where a plant is not that with which a bundle was proved.
+
+    No proof asks for its times, but for whether a stop is one at once.
+    """
+    path = _difference(_untimed(sealed), _untimed(model), ())
     if path is None:
         return ()
     message = f"{quoted('.'.join(map(str, path)))}: the bundle was proved with a plant file that says otherwise here"
@@ -471,8 +474,12 @@ def otherwise_than(sealed: PlantModel, model: PlantModel) -> tuple[Diagnostic, .
 
 def _untimed(part: Any) -> Any:
     """What a plant file says, without what only its simulation reads."""
+    if isinstance(part, BaseModel):
+        fields = {field.alias or name: name for name, field in type(part).model_fields.items()}
+        said = {key: _untimed(getattr(part, name)) for key, name in fields.items() if key not in _OF_THE_SIMULATION}
+        return said | {"takes_s": part.takes_s + part.jitter_s > 0} if isinstance(part, Stop) else said
     if isinstance(part, Mapping):
-        return {key: _untimed(value) for key, value in part.items() if key not in _OF_THE_SIMULATION}
+        return {key: _untimed(value) for key, value in part.items()}
     return [_untimed(one) for one in part] if isinstance(part, list | tuple) else part
 
 

@@ -10,7 +10,7 @@ from firable.executor.cell.disturbances import Drops, NeverCompletes, StuckSenso
 from firable.executor.cell.plant import CommandDone, SensorChanged, Workpiece
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.diagnostics import InputError, Severity
-from firable.nets.machines.plant_file import late_limits, misfits, parse_plant, read_plant
+from firable.nets.machines.plant_file import late_limits, misfits, otherwise_than, parse_plant, read_plant
 
 CELLS = [
     *("one_robot", "one_robot_mc_late", "one_robot_mc_late_capacity", "two_robots_shared", "two_robots_separate"),
@@ -507,3 +507,28 @@ def test_file_that_is_no_plant_is_refused(text: str, code: str, tmp_path: Path) 
     with pytest.raises(InputError) as refusal:
         read_plant(path)
     assert refusal.value.diagnostics[0].code == code
+
+
+def test_a_plant_is_another_one_by_what_is_called_like_a_time_and_by_a_stop_that_takes_one() -> None:
+    """A stop that takes time may still do what it breaks off, which a proof asks for."""
+    text = """\
+firable_plant: 1
+plant: press
+stations: [table]
+arrivals: {station: table, every_s: 5}
+departures: {station: table}
+machines:
+  P:
+    hand: HOME
+    positions: {HOME: table, likely: table}
+    commands: {RUN: {does: work, takes_s: 1}, HALT: {does: stop}, GO: {does: move, takes_s: 1}}
+"""
+    sealed = parse_plant(text)
+    assert not otherwise_than(sealed, parse_plant(text.replace("takes_s: 1", "takes_s: 3, jitter_s: 1")))
+    for one, other, where in (
+        ("{does: stop}", "{does: stop, takes_s: 1}", "machines.P.commands.HALT.takes_s"),
+        ("likely: table", "likely: ", "machines.P.positions.likely"),
+        ("RUN: {does: work, takes_s: 1}, ", "", "machines.P.commands.RUN"),
+    ):
+        (found,) = otherwise_than(sealed, parse_plant(text.replace(one, other)))
+        assert found.message.startswith(f"'{where}': ")
