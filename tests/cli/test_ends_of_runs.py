@@ -58,7 +58,7 @@ def test_a_run_on_machines_that_is_stopped_while_it_is_held_ends_as_one_that_som
         held = firable(*run, "--serve", "127.0.0.1:0")
         assert held.stdout is not None
         with heard_in_time(held):
-            next(line for line in held.stdout if "is held after a restart" in line)
+            next(line for line in held.stdout if "is held, until it is resumed" in line)
         held.send_signal(signal.SIGTERM)
         said, _ = held.communicate(timeout=PATIENCE_SECONDS)
         assert held.returncode == 3, said

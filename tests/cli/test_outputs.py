@@ -34,7 +34,7 @@ WORDS = {
     "operate": {"address", "what"},
     "refine": {"--cell"},
     "rehearse": {"--faults"},
-    "run": {"--controller", "--listen", "--join", "--serial", "--say", "--serve"},
+    "run": {"--certified", "--controller", "--listen", "--join", "--serial", "--say", "--serve"},
     "sim": {"--stuck", "--drop", "--hang"},
     "split": {"--own"},
     "view": {"--collapse"},

@@ -1,12 +1,17 @@
 """What a host says that is not what it says it is: it is not heard, and the others go on."""
 
 import asyncio
+from collections import Counter
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
+from support.examples import seeds
 from support.hosts import Cell
 
 from firable.decompose.splitting.cut import split
+from firable.decompose.splitting.persistence import freed
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.operating.between import Between
 from firable.executor.protocol.coordinator import Coordinator
@@ -21,6 +26,10 @@ from firable.executor.protocol.messages import (
     Vote,
     VoteRequest,
 )
+from firable.executor.simulation.campaign import Run, campaign
+from firable.executor.simulation.drawn import DRAWN
+from firable.executor.simulation.judge import Subject
+from firable.executor.simulation.world import World
 from firable.nets.catalogue import catalogue_net
 
 ONE_ROBOT = split(catalogue_net("one_robot"))
@@ -28,6 +37,15 @@ TWO_CELLS = split(catalogue_net("two_cells"))
 CELL_A = "coordinator cell_a"
 NONE = Readiness(1, frozenset())
 OTHER = frozenset({"nobody-has-this"})
+SUBJECTS: dict[str, Callable[[], list[Subject]]] = {
+    "cell": lambda: [Subject(ONE_ROBOT)],
+    "cell with free parts": lambda: [Subject(freed(ONE_ROBOT))],
+    "layers": lambda: [Subject(TWO_CELLS)],
+    **{
+        family: partial(lambda draw: [Subject(split(draw(n))) for n in range(8)], draw)
+        for family, draw in DRAWN.items()
+    },
+}
 
 
 @pytest.mark.parametrize(
@@ -69,6 +87,30 @@ def test_who_lost_the_arbitration_is_told_who_won_though_it_takes_no_part_in_tha
     assert winner in group
     assert any(winner not in asked[message.controller] for message in orders)
     assert all(between.has(message) for message in told if isinstance(message, VoteRequest | Decision))
+
+
+@pytest.mark.seeds
+@pytest.mark.parametrize("subject", SUBJECTS)
+def test_whatever_the_machines_say_to_each_other_through_faults_is_between_them(
+    subject: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Elections that are lost, restarts, late answers: a message that was dropped would be dropped for ever."""
+    said: Counter[str] = Counter()
+    betweens: dict[int, Between] = {}
+
+    def send(world: World, message: Message) -> None:
+        of = world.subject.decomposition
+        between = betweens.setdefault(id(of), Between(of))
+        assert between.has(message), message
+        said[type(message).__name__] += 1
+        put_on_its_way(world, message)
+
+    put_on_its_way = World.send
+    monkeypatch.setattr(World, "send", send)
+    subjects = SUBJECTS[subject]()
+    done = campaign(lambda seed: subjects[seed % len(subjects)], map(Run, seeds(40)))
+    assert not done.failed, done.failed[:1]
+    assert set(said) == {"Hello", "Report", "VoteRequest", "Vote", "Decision", "Acknowledgement"}
 
 
 def test_a_coordinator_orders_what_it_decides_alone() -> None:
