@@ -21,6 +21,8 @@ from firable.executor.operating.situation import Situation, State
 
 TOKEN = "a-token-of-some-length"
 BEARER = {"Authorization": f"Bearer {TOKEN}"}
+ASKING = f"GET /situation HTTP/1.1\r\nHost: cell\r\nAuthorization: Bearer {TOKEN}\r\n\r\n".encode()
+GOOD = b"HTTP/1.1 200 OK\r\n"
 PATIENCE_SECONDS = 20.0
 
 Stranger = tuple[asyncio.StreamReader, asyncio.StreamWriter]
@@ -89,14 +91,16 @@ def test_those_who_do_not_say_who_they_are_make_room(saying: bytes) -> None:
 
 def test_who_was_let_in_stays() -> None:
     async def main() -> None:
-        async with served(Run()) as url, ClientSession(connector=TCPConnector(limit=1)) as session:
-            assert await asked(session, url) == 200
-            (there,) = session.connector._conns  # type: ignore[union-attr]
-            ((before, _),) = session.connector._conns[there]  # type: ignore[union-attr]
-            await come(url, 2 * CONNECTIONS_MAX)
+        async with served(Run()) as url:
+            ((reader, writer),) = await come(url, 1, ASKING)
+            assert await reader.readline() == GOOD
+            head = await reader.readuntil(b"\r\n\r\n")
+            await reader.readexactly(int(head.lower().partition(b"content-length: ")[2].split()[0]))
+            strangers = await come(url, 2 * CONNECTIONS_MAX)
             await asyncio.sleep(0.1)
-            assert before.is_connected()
-            assert await asked(session, url) == 200
+            writer.write(ASKING)  # on the same connection
+            assert await reader.readline() == GOOD
+            assert strangers
 
     asyncio.run(main())
 
@@ -107,8 +111,8 @@ def test_who_comes_fast_from_one_address_closes_his_own_and_not_that_of_an_opera
             port = int(url.rpartition(":")[2])
             reader, writer = await asyncio.open_connection("127.0.0.1", port, local_addr=("127.0.0.2", 0))
             strangers = await come(url, 3 * CONNECTIONS_MAX)
-            writer.write(f"GET /situation HTTP/1.1\r\nHost: cell\r\nAuthorization: Bearer {TOKEN}\r\n\r\n".encode())
-            assert await reader.readline() == b"HTTP/1.1 200 OK\r\n"
+            writer.write(ASKING)
+            assert await reader.readline() == GOOD
             assert strangers
 
     asyncio.run(main())
@@ -116,15 +120,14 @@ def test_who_comes_fast_from_one_address_closes_his_own_and_not_that_of_an_opera
 
 def test_operators_get_in_where_all_who_are_there_were_let_in_and_more_than_one_comes() -> None:
     async def main() -> None:
-        saying = f"GET /situation HTTP/1.1\r\nHost: cell\r\nAuthorization: Bearer {TOKEN}\r\n\r\n".encode()
         async with served(Run()) as url:
-            for reader, _ in (there := await come(url, CONNECTIONS_MAX, saying)):
-                assert await reader.readline() == b"HTTP/1.1 200 OK\r\n"
+            for reader, _ in (there := await come(url, CONNECTIONS_MAX, ASKING)):
+                assert await reader.readline() == GOOD
             late = await come(url, COMING_MIN)
             await asyncio.sleep(0.1)
             for reader, writer in late:
-                writer.write(saying)
-                assert await reader.readline() == b"HTTP/1.1 200 OK\r\n"
+                writer.write(ASKING)
+                assert await reader.readline() == GOOD
             assert there
 
     asyncio.run(main())
