@@ -5,8 +5,8 @@ group: by the coordinator where a global transition is in it, else by the contro
 rule are those of its arbiter, and of a component without one the order of the file. So a table that says otherwise is
 not one that anything was proved of, and who runs a bundle can tell without a solver.
 
-This is a second text of what `firable.decompose.splitting` makes, for those who may import no more than nets; that the
-two agree is seen wherever a bundle is made, which could not run otherwise.
+So it is written here, for those who may import no more than nets, and `firable.decompose.splitting` makes tables of it.
+The checker of bundles cuts nets by a text of its own (`firable.decompose.verification.recut`).
 """
 
 from __future__ import annotations

@@ -12,8 +12,9 @@ table is derived, and for the paper's own cell the derived table is the publishe
 Decided by the coordinator are the global transitions and every local one in the conflict component of a global one
 (O2): two deciders of one conflict would each choose a winner. Where controllers stand in layers, it is the lowest
 coordinator above all participants of the component that decides (`firable.nets.layers`), and of all components that
-contend for promises (`firable.nets.contention`). The subnets are flat: which
-layer a controller stands in stays with the central net, since it changes nothing that the controller itself does.
+contend for promises (`firable.nets.contention`). `firable.nets.deciding` reads that off the net, for whoever runs a
+table, too. The subnets are flat: which layer a controller stands in stays with the central net, since it changes
+nothing that the controller itself does.
 """
 
 from __future__ import annotations
@@ -22,10 +23,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import count
 
-from firable.nets.contention import decided_together
-from firable.nets.decomposition import ArbitrationGroup, Coordinated, Decomposition, Part
+from firable.nets.deciding import deciders, groups, owners
+from firable.nets.decomposition import Coordinated, Decomposition, Part
 from firable.nets.diagnostics import Diagnostic, InputError
-from firable.nets.layers import Layers
 from firable.nets.net import Net, Place, Signal, Transition
 from firable.semantics.arbitration import Arbitration
 
@@ -39,10 +39,8 @@ def participants(net: Net, transition: Transition) -> tuple[str, ...]:
     >>> participants(net, net.transition("t"))
     ('a', 'b')
     """
-    places = (*transition.inputs, *transition.outputs, *transition.permissive, *transition.inhibitive)
-    owners = {net.place(place).owner for place in places}
-    owners |= {net.signal(gate.signal).owner for gate in transition.external}
-    return tuple(sorted((owner for owner in owners if owner is not None), key=net.controller_index.__getitem__))
+    taking_part = (owner for owner in owners(net, transition) if owner is not None)
+    return tuple(sorted(taking_part, key=net.controller_index.__getitem__))
 
 
 def unowned(net: Net) -> tuple[str, ...]:
@@ -83,63 +81,33 @@ def split(net: Net) -> Decomposition:
     if problems:
         raise InputError(problems)
     taking_part = {transition.name: participants(net, transition) for transition in net.transitions}
-    numbers = _numbers(net, [name for name, owners in taking_part.items() if len(owners) > 1])
+    numbers = _numbers(net, [name for name, its in taking_part.items() if len(its) > 1])
     controllers = controller_numbers(net)
 
     parts: dict[str, tuple[Part, ...]] = {}
-    for name, owners in taking_part.items():
-        if len(owners) == 1:
-            parts[name] = (Part(owners[0], name),)
+    for name, its in taking_part.items():
+        if len(its) == 1:
+            parts[name] = (Part(its[0], name),)
         else:
-            numbered = sorted((controllers[owner], owner) for owner in owners)
+            numbered = sorted((controllers[owner], owner) for owner in its)
             parts[name] = tuple(Part(owner, part_name(number, numbers[name])) for number, owner in numbered)
     if clashes := list(_clashes(parts)):
         raise InputError(clashes)
 
-    arbitration, layers = Arbitration.of(net), Layers(net)
-    decided = _deciders(net, layers, taking_part, arbitration)
-    groups = []
-    for group, members in zip(arbitration.groups, arbitration.conflicts.components, strict=True):
-        names = [net.transitions[t].name for t in members]
-        at = decided.get(names[0])
-        groups.append(
-            ArbitrationGroup(
-                group.name,
-                tuple(net.transitions[t].name for t in group.sequence),
-                tuple(net.transitions[t].name for t in group.rest),
-                group.by,
-                # Local transitions in conflict share a place, so they are all of its owner.
-                None if at is not None else parts[names[0]][0].controller,
-                at if at != layers.root else None,
-            )
-        )
+    Arbitration.of(net)  # which refuses an arbiter that fits no component
+    at = deciders(net)
     coordinated = tuple(
         Coordinated(
             t.name,
             numbers.get(t.name, t.number),
             parts[t.name],
             t.description,
-            decided[t.name] if decided[t.name] != layers.root else None,
+            at[t.name],
         )
         for t in net.transitions
-        if t.name in decided
+        if t.name in at
     )
-    return Decomposition(net, _subnets(net, parts), coordinated, tuple(groups))
-
-
-def _deciders(
-    net: Net, layers: Layers, taking_part: Mapping[str, Sequence[str]], arbitration: Arbitration
-) -> dict[str, str]:
-    """The coordinator of each transition that is not its controller's own: global, or in conflict with such a one."""
-    components = [[net.transitions[t].name for t in members] for members in arbitration.conflicts.components]
-    in_conflict = {name for names in components for name in names}
-    alone = [[t.name] for t in net.transitions if t.name not in in_conflict]
-    groups = [names for names in (*components, *alone) if any(len(taking_part[name]) > 1 for name in names)]
-    decided = {}
-    for names in decided_together(net, groups) if layers.several else groups:
-        at = layers.common(dict.fromkeys(owner for name in names for owner in taking_part[name]))
-        decided.update(dict.fromkeys(names, at))
-    return decided
+    return Decomposition(net, _subnets(net, parts), coordinated, tuple(groups(net, at)))
 
 
 def _problems(net: Net) -> Iterator[Diagnostic]:
