@@ -239,7 +239,7 @@ def _unclear(model: PlantModel, of: Property | TemporalProperty) -> bool:
     """
     if isinstance(of, Property) and of.kind is PropertyKind.NEVER and of.formula == Deadlock():
         return False
-    restless = any(sensor.may_flicker or sensor.may_linger or sensor.acknowledges for sensor in model.sensors.values())
+    restless = any(sensor.may_flicker or sensor.may_linger or sensor.by_hand for sensor in model.sensors.values())
     passing = model.departure(model.arrivals.station) is not None
     return (restless or passing) and _speaks_of_deadlock(of)
 

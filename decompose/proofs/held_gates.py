@@ -44,6 +44,9 @@ COMMANDS = "o4.commands"
 EVIDENCE = "o4.evidence.json"
 _HINT = "put the interlock into the machine's own controller, or make the signal one that a command clears"
 _BARE_HINT = "let the controller that reads '{}' give a token to '{}': without one it may have voted long before"
+_OUTSIDE_HINT = (
+    "read '{}' in a transition of its own controller, and let '{}' take the token that this leaves: it remembers it"
+)
 
 
 def name_of(assumption: Assumption) -> str:
@@ -89,7 +92,9 @@ def held_gates(
     for one in assumptions(decomposition):
         asked = never(name_of(one), _closed_after_vote(loop, decomposition, rows[one.transition], one))
         part = _part(decomposition, rows[one.transition], decomposition.net.signal(one.signal).owner)
-        hint = _HINT if part.inputs else _BARE_HINT.format(one.signal, one.transition)
+        outside = (seen := model.sensors.get(one.signal)) is not None and seen.set_by is not None
+        said = _HINT if part.inputs else _BARE_HINT
+        hint = (_OUTSIDE_HINT if outside else said).format(one.signal, one.transition)
         families.append(Family(name_of(one), str(one), {one.signal: asked}, hint=hint))
     completions = [
         Assumption(row.name, gate.signal, gate.wanted)

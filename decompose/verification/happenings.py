@@ -108,6 +108,8 @@ class Plant(Things):
         for name, sensor in self.model.sensors.items():
             if sensor.acknowledges is not None:
                 yield f"{name}/pressed", partial(self.pressed, name)
+            for way, value in (("set", True), ("reset", False)) if sensor.set_by is not None else ():
+                yield f"{name}/{way}", partial(self.set_from_outside, name, value=value)
             for way, may in (
                 ("drops", sensor.may_flicker),
                 ("returns", sensor.may_flicker),
@@ -431,6 +433,11 @@ class Plant(Things):
         """A key is released while the machine that it is for is at a command."""
         if state[f"key {name}"] and state[f"at {self.model.sensors[name].acknowledges}"] is not None:
             yield {f"key {name}": False}
+
+    def set_from_outside(self, name: str, state: State, *, value: bool) -> Iterator[Changes]:
+        """Somebody outside the cell changes a signal, whatever goes on in it."""
+        if state[f"set {name}"] != value:
+            yield {f"set {name}": value}
 
     def over(self, timer: str, state: State) -> Iterator[Changes]:
         """A time is over, while the token waits for a completion that has not come."""

@@ -192,7 +192,8 @@ class Asked:
         """Whether a property speaks of deadlocks where sensors or workpieces never rest; then it is not asked."""
         model = self.plant.model
         sensors = model.sensors.values()
-        restless = any(one.may_flicker or one.may_linger or one.acknowledges is not None for one in sensors)
+        moved = (one.acknowledges is not None or one.set_by is not None for one in sensors)
+        restless = any(moved) or any(one.may_flicker or one.may_linger for one in sensors)
         passes = any(out.station == model.arrivals.station for out in model.departures)
         return (restless or passes) and not _never_a_deadlock(prop) and _speaks_of_deadlock(prop)
 

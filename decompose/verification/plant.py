@@ -74,6 +74,8 @@ class Things:
         for name, sensor in self.model.sensors.items():
             if sensor.acknowledges is not None:
                 found[f"key {name}"] = {True: name, False: f"plant.{name}.released"}
+            elif sensor.set_by is not None:
+                found[f"set {name}"] = {True: name, False: f"plant.{name}.reset"}
             elif sensor.may_flicker or sensor.may_linger:
                 found[f"bit {name}"] = {True: f"plant.{name}.sensor" if name in self.completions else name}
         found |= {f"told {name}": {True: f"plant.{name}.told_1", False: f"plant.{name}.told_0"} for name in self.late}
@@ -347,7 +349,7 @@ class Things:
         found = {name: f"signal {name}" for name in self.completions}
         for name, sensor in self.model.sensors.items():
             if name not in found and any(signal.name == name for signal in self.net.signals):
-                ways = (f"key {name}", f"bit {name}", f"judged {sensor.passes or sensor.fails}")
+                ways = (f"key {name}", f"set {name}", f"bit {name}", f"judged {sensor.passes or sensor.fails}")
                 found[name] = next((thing for thing in ways if thing in self.things), target_of(sensor))
         return found
 
@@ -362,6 +364,8 @@ class Things:
         sensor = self.model.sensors[name]
         if sensor.acknowledges is not None:
             return bool(state[f"key {name}"])
+        if sensor.set_by is not None:
+            return bool(state[f"set {name}"])
         if sensor.may_flicker or sensor.may_linger:
             return bool(state[f"bit {name}"])
         if sensor.passes is not None or sensor.fails is not None:

@@ -69,9 +69,8 @@ def _compare_names(plant: Plant, loop: ClosedLoop) -> None:
                 verdicts = plant.things[f"judged {sensor.passes or sensor.fails}"]
                 shown[signal] = verdicts[GOOD if sensor.passes is not None else BAD], True
                 continue
-            bit = plant.things.get(f"key {signal}") or plant.things.get(f"bit {signal}")
-            seen = f"has {sensor.occupied or sensor.holding}"
-            shown[signal] = (plant.things[seen][None], False) if bit is None else (bit[True], True)
+            places = plant.things[plant.truths[signal]]
+            shown[signal] = (places[True], True) if True in places else (places[None], False)
     shown |= {signal: (plant.things[f"told {signal}"][True], True) for signal in plant.late}
     if dict(loop.shown) != shown:
         raise DiffersError("the places that show the signals are others")

@@ -114,6 +114,13 @@ class _Press:
 
 
 @dataclass(frozen=True, slots=True)
+class _Switch:
+    """Somebody outside the cell sets a signal, or resets it."""
+
+    signal: str
+
+
+@dataclass(frozen=True, slots=True)
 class _Stick:
     """A sensor gets stuck: `_seen` looks at the disturbances."""
 
@@ -129,7 +136,7 @@ class _Look:
     """Of the looks at that station: one that was begun anew since, or has nothing to see any more, finds nothing."""
 
 
-_Event = _Arrival | _Departure | _Finish | _Press | _Stick | _Look
+_Event = _Arrival | _Departure | _Finish | _Press | _Switch | _Stick | _Look
 
 
 @dataclass(slots=True)
@@ -188,7 +195,9 @@ class Plant:
         self.delivered: list[Workpiece] = []
         self.shown = dict.fromkeys(model.sensors, False)
         self.pressed: set[str] = set()
-        """The keys that somebody has pressed."""
+        """The keys that somebody has pressed, and the signals that are set from outside."""
+        self.rounds = {name: 0 for name, sensor in model.sensors.items() if sensor.for_s is not None}
+        """How often each signal that is set from outside again and again has been reset."""
         self.faulted = False
         self.arrival_due = False
         self.is_closed = False
@@ -198,6 +207,9 @@ class Plant:
         self.now_seconds = 0.0
         if workpieces:
             self._in(0.0, model.arrivals.jitter_s, _Arrival())
+        for name, sensor in model.sensors.items():
+            if sensor.set_by is not None:
+                self._in(sensor.after_s, 0.0, _Switch(name))
         for stuck in self.disturbances.stuck:
             self._in(stuck.from_seconds, 0.0, _Stick(stuck))
 
@@ -205,6 +217,13 @@ class Plant:
     def next_seconds(self) -> float | None:
         """When something happens next, if no command comes before; None: never."""
         return self.events[0][0] if self.events and not self.faulted else None
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether nothing happens any more if no command comes, but that signals are set from outside again."""
+        return self.faulted or all(
+            isinstance(event, _Switch) and event.signal in self.rounds for *_, event in self.events
+        )
 
     @property
     def inside(self) -> tuple[int, ...]:
@@ -292,11 +311,20 @@ class Plant:
             case _Press(signal):
                 if self.machines[str(self.model.sensors[signal].acknowledges)].busy is None:
                     self.pressed.add(signal)
+            case _Switch(signal):
+                self._switch(signal, self.model.sensors[signal])
             case _Look(station, number):
                 if number == self.looks[station][0]:
                     self._find(station)
             case _Stick(stuck):
                 self.befallen.append((stuck, f"{stuck.signal} is stuck at {int(stuck.value)}"))
+
+    def _switch(self, signal: str, sensor: Sensor) -> None:
+        self.pressed ^= {signal}
+        if sensor.for_s is None:
+            return
+        self.rounds[signal] += signal not in self.pressed
+        self._in(sensor.for_s if signal in self.pressed else sensor.after_s, 0.0, _Switch(signal))
 
     def _arrive(self) -> None:
         arrivals = self.model.arrivals
@@ -509,7 +537,7 @@ class Plant:
             return shown
         if sensor.occupied is not None:
             return self.stations[sensor.occupied] is not None
-        if sensor.acknowledges is not None:
+        if sensor.by_hand:
             return name in self.pressed
         if sensor.judges is not None:
             return self.found_good.get(sensor.judges) is (sensor.passes is not None)

@@ -111,7 +111,10 @@ class Driver(Protocol):
 
     @property
     def at_rest(self) -> bool:
-        """Whether nothing will happen any more unless a command is sent; False where the driver cannot know."""
+        """Whether nothing will happen any more unless a command is sent, or somebody sets a signal from outside.
+
+        False where the driver cannot know.
+        """
         ...
 
     @property

@@ -80,8 +80,8 @@ class SimulatedDriver:
 
     @property
     def at_rest(self) -> bool:
-        """Whether no event is scheduled in the plant."""
-        return self.plant.next_seconds is None
+        """Whether no event is scheduled in the plant, but that signals are set from outside again."""
+        return self.plant.at_rest
 
     @property
     def unconfirmed(self) -> tuple[str, ...]:

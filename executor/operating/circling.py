@@ -8,6 +8,9 @@ that was under way when they began: a workpiece that arrives in an hour, a machi
 Nor before that has happened many times, since firings alone say little: beside a lamp that blinks, a motion of a minute
 that is in time once in four has hardly been tried when the lamp has made up the number.
 
+A run in which nothing fires at all has come to rest, though its operator turns a key again and again. It may take
+several turns until a door is shut at the same time, so some are waited for.
+
 Rejected: to look for the very same moment, with all times in it. Where machines take now longer and now shorter it
 never comes again, and what the machines of the protocol remember would have to be compared as well. Rejected, too: so
 many seconds without a workpiece that moves. How long a cell may well wait only its plant file and its time limits know.
@@ -31,6 +34,8 @@ FIRINGS_MAX: Final = 5_000
 """So many firings on end that lead to nothing new are a circle."""
 ROUNDS_MAX: Final = 300
 """If meanwhile, so many times, all that was under way has come to its end."""
+SWITCHED_MAX: Final = 20
+"""So many times a signal that is set from outside again and again may come and go, and nothing fires any more."""
 KNOWN_MAX: Final = 100_000
 """So much is remembered of what was there; a circle that is larger is not noticed."""
 _TOLD_MAX: Final = 6
@@ -53,11 +58,19 @@ class Circling:
         """What was to come when the round began."""
         self.rounds = 0
         """How many times since then all that was to come has come."""
+        self.switched = dict(cell.rounds)
+        """How often signals that are set from outside had come and gone at the last firing."""
+
+    @property
+    def is_hoped(self) -> bool:
+        """Whether a signal that is set from outside again and again may still let something fire."""
+        return any(self.cell.rounds[name] - before < SWITCHED_MAX for name, before in self.switched.items())
 
     def seen(self, event: Event) -> None:
         """Take an event of the trace."""
         if not isinstance(event, Fired):
             return
+        self.switched.update(self.cell.rounds)
         through = (self.cell.entered, len(self.cell.delivered))
         if through != self.through or len(self.known) >= KNOWN_MAX:
             self.through = through

@@ -7,7 +7,8 @@ themselves, and at the stations of `elsewhere` what machines do that nobody here
 that say what a sensor shows, and that a machine is at a command, with how long that may take.
 
 Which firing was open by which sensor is not asked again (the replay asks it): those gates are stripped, because a vote
-may outlive its gate (O4). Those of completions stay, which only their command clears.
+may outlive its gate (O4). Those of completions stay, which only their command clears. A signal that is set from outside
+shows nothing of the machines then, and would only double what is believed: it is left out.
 
 The same markings are asked about again and again, so what may happen hidden in one is remembered, for a bounded number
 of them. What is believed, and what time says, is the monitor's. Rejected: to ask the loop as a net. A belief has
@@ -87,7 +88,10 @@ class WatchedLoop:
     """The loop of a net and the machines of a plant; raises `InputError` F5003 where they do not fit."""
 
     def __init__(self, net: Net, model: PlantModel, elsewhere: Collection[str]) -> None:
-        loop = close(_without_sensor_gates(net), model, sending=Sending.LATE)
+        sensors = {name: sensor for name, sensor in model.sensors.items() if sensor.set_by is None}
+        outside = model.sensors.keys() - sensors.keys()
+        model = model.model_copy(update={"sensors": sensors})
+        loop = close(_of_the_machines(net, outside), model, sending=Sending.LATE)
         laws = Laws(model, net)
         self.net = net
         self.index = loop.net.place_index
@@ -195,10 +199,12 @@ class WatchedLoop:
         return machine.positions[dict(command.parameters)["at"]] if command is not None else None
 
 
-def _without_sensor_gates(net: Net) -> Net:
+def _of_the_machines(net: Net, outside: Collection[str]) -> Net:
+    """A net without the signals that are set from outside, and with no gates but those of completions."""
     completions = {signal for place in net.places for signal in place.cleared}
     return replace(
         net,
+        signals=tuple(signal for signal in net.signals if signal.name not in outside),
         transitions=tuple(
             replace(one, external=tuple(gate for gate in one.external if gate.signal in completions))
             for one in net.transitions

@@ -10,8 +10,9 @@ decides it, and its firing rule is the one there is.
   stopped machine was idle or busy), and a firing is one transition, so a transition of the cell becomes several
   *variants*, of which at most one is firable. `variants` maps each back to the cell's own transition.
 - *A machine moves*: a command is done, a workpiece comes or goes, a sensor that is not exact drops, somebody presses a
-  key. A time limit may be over at any moment while its place holds the token and the completion has not come; so the
-  fault transition asks for no more, and its timer is a place only where something else reads it.
+  key or sets a signal from outside. A time limit may be over at any moment while its place holds the token and the
+  completion has not come; so the fault transition asks for no more, and its timer is a place only where something else
+  reads it.
 - *An accident* ends the run: the executor stops every machine where it is. Nothing fires afterwards.
 
 A variant has exactly the arcs and internal gates of its transition among the places of the cell, and a move of a
@@ -77,7 +78,7 @@ class _Closing:
         self.sharing = {name: sum(place.completion == name for place in net.places) > 1 for name in completions}
         self.inexact = [name for name, sensor in model.sensors.items() if sensor.may_flicker or sensor.may_linger]
         self.timers = self.timers_read()
-        self.keys = [name for name, sensor in model.sensors.items() if sensor.acknowledges is not None]
+        self.by_hand = [name for name, sensor in model.sensors.items() if sensor.by_hand]
         self.acknowledged = {name: f"{PLANT}.{name}.acknowledged" for name in completions if name in model.sensors}
         truth = {
             signal.name: (signal.name, True) if signal.name in self.sharing else self.sensor(signal.name)
@@ -198,10 +199,10 @@ class _Closing:
                 yield Place(signal.name, signal.owner, description="completion")
             elif signal.name in self.timers:
                 yield Place(signal.name, signal.owner, description="timer")
-        for name in (*self.inexact, *self.keys):
+        for name in (*self.inexact, *self.by_hand):
             yield self.bit(name)
-        for name in self.keys:
-            yield fact(self.let_go(name), f"{name} is not pressed", marked=True)
+        for name in self.by_hand:
+            yield fact(self.let_go(name), f"{name} is not {self.hand_words(name)[0]}", marked=True)
         for name, acknowledged in self.acknowledged.items():
             yield fact(acknowledged, f"the command of {name} is acknowledged, and its sensor does not show it yet")
         for name, unsent in self.unsent.items():
@@ -211,9 +212,13 @@ class _Closing:
         for name, failed in self.failed.items():
             yield fact(failed, f"{name} has failed")
 
-    def let_go(self, key: str) -> str:
-        """The place that holds a token iff a key is not pressed."""
-        return f"{PLANT}.{key}.released"
+    def let_go(self, signal: str) -> str:
+        """The place that holds a token iff a key is not pressed, or a signal is not set from outside."""
+        return f"{PLANT}.{signal}.{self.hand_words(signal)[1]}"
+
+    def hand_words(self, signal: str) -> tuple[str, str]:
+        """What somebody does with a key, or with a signal that is set from outside, and how it is undone."""
+        return ("pressed", "released") if self.model.sensors[signal].set_by is None else ("set", "reset")
 
     def bit(self, sensor: str) -> Place:
         """The place of a sensor that is not exact, under the name of its signal where that is no completion."""
@@ -223,7 +228,7 @@ class _Closing:
 
     def sensor(self, name: str) -> Literal:
         """The place that shows a sensor, and whether a token means 1."""
-        if name in self.inexact or name in self.keys:
+        if name in self.inexact or name in self.by_hand:
             return self.bit(name).name, True
         if (sensor := self.model.sensors.get(name)) is not None and sensor.judges is not None:
             return self.laws.verdict(sensor.judges, good=sensor.passes is not None), True
@@ -377,7 +382,7 @@ class _Closing:
             yield from self.named(f"{station}/judged", f"the workpiece on {station} is judged", judged)
 
     def unsteady(self, start: list[Moment], calm: list[Moment]) -> Iterator[Transition]:
-        """What a sensor that is not exact does by itself, and a key."""
+        """What a sensor that is not exact does by itself, a key, and what is set from outside."""
         for name in self.inexact:
             sensor, bit, empty = self.model.sensors[name], self.bit(name).name, self.reality(name)
             ways = []
@@ -392,14 +397,17 @@ class _Closing:
                 words = f"the sensor of {name} sees that the workpiece has gone"
                 yield from self.named(f"{name}/clears", words, each(start, [case]))
 
-        for name in self.keys:
-            pressed = Case(((name, False), (self.let_go(name), True)), ((name, True), (self.let_go(name), False)))
-            yield from self.named(f"{name}/pressed", f"{name} is pressed", each(start, [pressed]))
-            # The next command to the machine releases it: so it holds until what waits for it has fired (O4), and is
-            # told of in any order with what else comes of that command.
-            idle = self.laws.idle(str(self.model.sensors[name].acknowledges))
-            released = Case(((idle, False), *pressed.leaves), pressed.wants)
-            yield from self.named(f"{name}/released", f"{name} is released", each(calm, [released]))
+        for name in self.by_hand:
+            sensor, (done, undone) = self.model.sensors[name], self.hand_words(name)
+            on = Case(((name, False), (self.let_go(name), True)), ((name, True), (self.let_go(name), False)))
+            by = f" by {sensor.set_by}" if sensor.set_by is not None else ""
+            yield from self.named(f"{name}/{done}", f"{name} is {done}{by}", each(start, [on]))
+            off, quiet = Case(on.leaves, on.wants), start
+            if sensor.acknowledges is not None:
+                # The next command to the machine releases it: so it holds until what waits for it has fired (O4), and
+                # is told of in any order with what else comes of that command.
+                off, quiet = replace(off, wants=((self.laws.idle(sensor.acknowledges), False), *off.wants)), calm
+            yield from self.named(f"{name}/{undone}", f"{name} is {undone}{by}", each(quiet, [off]))
 
     def times(self) -> Iterator[Transition]:
         """Any time can be over while a token waits for a completion that has not come: nothing is known of times."""

@@ -183,8 +183,8 @@ class Departure(_Model):
 
 
 class Sensor(_Model):
-    """What a sensor sees: a workpiece on a station, one in the hand of a machine, an operator who presses a key, or
-    whether a workpiece is good.
+    """What a sensor sees: a workpiece on a station, one in the hand of a machine, an operator who presses a key,
+    whether a workpiece is good, or what somebody sets from outside.
 
     A workpiece is judged some time after it has come to a station of which a sensor sees what `passes` or what `fails`,
     and again when it has been machined there; the judgement stands until then, or until the workpiece leaves. In a
@@ -195,15 +195,20 @@ class Sensor(_Model):
     when the workpiece has gone. A key acknowledges a fault: in a simulated run it is pressed `after_s` after the
     machine was stopped in the midst of a command; a model of the machines leaves open when and how often. The next
     command to the machine releases it.
+
+    What is set from outside, by the key of an operator, a door or the next cell, is 0 at first, and may change at any
+    time. In a simulated run it is 0 for `after_s`, and then 1: for good, or for `for_s`, and so on.
     """
 
     occupied: OptionalName = None
     holding: OptionalName = None
     acknowledges: OptionalName = None
+    set_by: OptionalName = None
     passes: OptionalName = None
     fails: OptionalName = None
     likely: Annotated[Probability | None, BeforeValidator(given, json_schema_input_type=Probability)] = None
     after_s: Seconds = 0.0
+    for_s: Annotated[Seconds | None, BeforeValidator(given, json_schema_input_type=Seconds)] = None
     may_flicker: bool = False
     may_linger: bool = False
 
@@ -211,6 +216,11 @@ class Sensor(_Model):
     def judges(self) -> str | None:
         """The station whose workpieces it shows the judgement of, if that is what it shows."""
         return self.passes or self.fails
+
+    @property
+    def by_hand(self) -> bool:
+        """Whether it shows what somebody does, and nothing of the machines and workpieces."""
+        return self.acknowledges is not None or self.set_by is not None
 
     @property
     def station(self) -> str | None:
@@ -259,7 +269,7 @@ class PlantModel(_Model):
 
 SEEN: Final = (
     "`occupied: STATION`, `holding: MACHINE`, `acknowledges: MACHINE`, `passes: STATION` or `fails: STATION` "
-    "(a workpiece there was found good, or not)"
+    "(a workpiece there was found good, or not), or `set_by: WHO` (an operator, a door, the next cell)"
 )
 """What a sensor can see, for who has to write it."""
 _COMMAND: Final = ("machines", "*", "commands", "*")
@@ -359,7 +369,7 @@ def _inconsistencies(model: PlantModel) -> Iterator[tuple[Path, str, str]]:
                 case Clamp(station=at) | Process(station=at) | Release(station=at):
                     yield from station((*inner, "station"), at)
     for name, sensor in model.sensors.items():
-        seen = (sensor.occupied, sensor.holding, sensor.acknowledges, sensor.passes, sensor.fails)
+        seen = (sensor.occupied, sensor.holding, sensor.acknowledges, sensor.passes, sensor.fails, sensor.set_by)
         if sum(one is not None for one in seen) != 1:
             yield ("sensors", name), "a sensor sees one thing", f"write {SEEN}"
         if sensor.judges is not None and (sensor.may_flicker or sensor.may_linger):
@@ -370,9 +380,17 @@ def _inconsistencies(model: PlantModel) -> Iterator[tuple[Path, str, str]]:
             yield ("sensors", name, "likely"), "nothing is judged by this sensor", hint
         if sensor.acknowledges is not None and (sensor.may_flicker or sensor.may_linger):
             yield ("sensors", name), "a key is pressed or not", "leave out `may_flicker` and `may_linger`"
-        if sensor.acknowledges is None and sensor.judges is None and sensor.after_s:
-            hint = "`after_s` belongs to `acknowledges`, `passes` and `fails`"
+        if sensor.set_by is not None and (sensor.may_flicker or sensor.may_linger):
+            hint = "leave out `may_flicker` and `may_linger`"
+            yield ("sensors", name), "what is set from outside may change at any time as it is", hint
+        if not sensor.by_hand and sensor.judges is None and sensor.after_s:
+            hint = "`after_s` belongs to `acknowledges`, `passes`, `fails` and `set_by`"
             yield ("sensors", name, "after_s"), "a sensor sees at once", hint
+        if sensor.for_s is not None and sensor.set_by is None:
+            yield ("sensors", name, "for_s"), "nobody sets this sensor", "`for_s` belongs to `set_by`"
+        elif sensor.for_s is not None and not (sensor.for_s and sensor.after_s):
+            hint = "give `for_s` and `after_s` more than 0 s, or leave out `for_s`: then it stays 1"
+            yield ("sensors", name, "for_s"), "it would change again and again, and no time would pass", hint
         for where, at in (("occupied", sensor.occupied), ("passes", sensor.passes), ("fails", sensor.fails)):
             yield from station(("sensors", name, where), at)
         for key, machine_seen in (("holding", sensor.holding), ("acknowledges", sensor.acknowledges)):
@@ -410,7 +428,7 @@ def _disagreements(model: PlantModel) -> Iterator[tuple[Path, str, str]]:
             yield ("sensors", name, "likely"), message, hint
 
 
-_OF_THE_SIMULATION: Final = frozenset({"takes_s", "jitter_s", "every_s", "after_s", "likely", "description"})
+_OF_THE_SIMULATION: Final = frozenset({"takes_s", "jitter_s", "every_s", "after_s", "for_s", "likely", "description"})
 
 
 def _share(probability: float) -> str:
@@ -534,6 +552,7 @@ def _misfits_of_signals(model: PlantModel, net: Net) -> Iterator[Diagnostic]:
         if kind is SignalKind.TIMER:
             hint = "a timer is set by its controller: rename the sensor"
             yield model.misfit(at, at, f"'{name}' is a timer of the net", hint)
-        if sensor.acknowledges is not None and kind is SignalKind.COMPLETION:
+        if sensor.by_hand and kind is SignalKind.COMPLETION:
             hint = "declare it under `inputs`, and write it as `if` of a transition"
-            yield model.misfit(at, at, f"the key '{name}' is a completion of the net", hint)
+            what = "the key" if sensor.set_by is None else "what is set from outside,"
+            yield model.misfit(at, at, f"{what} '{name}' is a completion of the net", hint)

@@ -121,7 +121,7 @@ def test_other_sensor_of_a_station_need_not_say_how_likely_it_is_and_no_one_else
         ("{passes: table, occupied: table}", "a sensor sees one thing", "`passes: STATION` or `fails: STATION`"),
         ("{passes: table, may_flicker: true}", "a judgement stands until", "a sensor with `occupied` can have them"),
         ("{fails: table, may_linger: true}", "a judgement stands until", "a sensor with `occupied` can have them"),
-        ("{occupied: table, after_s: 2}", "a sensor sees at once", "`acknowledges`, `passes` and `fails`"),
+        ("{occupied: table, after_s: 2}", "a sensor sees at once", "`acknowledges`, `passes`, `fails` and `set_by`"),
         ("{occupied: table, likely: 0.5}", "nothing is judged", "`likely` belongs to `passes` and `fails`"),
         ("{fails: table, likely: 0.3}", "found good with 0.6, as 'ok' says, and here with 0.7", "say it once"),
         ("{passes: table, likely: 0.4}", "found good with 0.6, as 'ok' says, and here with 0.4", "say it once"),

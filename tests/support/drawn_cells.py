@@ -265,7 +265,7 @@ class _Drawing:
         return local
 
     def sensor(self, controller: str, local: str, sees: Document) -> str:
-        exact = {"passes", "fails", "acknowledges"} & {*sees}
+        exact = {"passes", "fails", "acknowledges", "set_by"} & {*sees}
         self.sensors[f"{controller}.{local}"] = sees | ({} if exact else self.draw.choice(BLURRED))
         return f"{controller}.{local}"
 
@@ -277,11 +277,11 @@ class _Drawing:
     # --- What looks on
 
     def further_sensor(self) -> None:
-        """A sensor of any kind, a camera or a key, told to any controller."""
-        choices = [self.occupied(), self.holding(), self.judging()]
+        """A sensor of any kind, a camera, a key or what is set from outside, told to any controller."""
+        choices = [self.occupied(), self.holding(), self.judging(), self.from_outside()]
         if self.stops:
             choices.append({"acknowledges": self.draw.choice([*self.stops]), "after_s": self.seconds(0.1, 1)})
-        sees = self.draw.choices(choices, weights=[35, 30, 25, 10][: len(choices)])[0]
+        sees = self.draw.choices(choices, weights=[35, 30, 25, 10, 10][: len(choices)])[0]
         self.sensor(self.draw.choice(self.controllers), f"{next(iter(sees))}_{len(self.sensors)}", sees)
 
     def occupied(self) -> Document:
@@ -293,6 +293,10 @@ class _Drawing:
     def judging(self) -> Document:
         kind = self.draw.choice(["passes", "fails"])
         return {kind: self.draw.choice(self.stations), "after_s": self.seconds(0.1, 1)}
+
+    def from_outside(self) -> Document:
+        again: Document = {"after_s": self.seconds(0.1, 4), "for_s": self.seconds(0.1, 4)}
+        return {"set_by": "operator", **(again if self.draw.random() < 0.7 else {})}
 
     def watcher(self, i: int) -> None:
         """Two places between which a token goes by what several signals show; the second may stop a machine."""
