@@ -64,12 +64,12 @@ def pack_frame(frame: Frame) -> bytes:
 
 
 class FrameReader:
-    """Finds frames in the bytes of a line; what is damaged is dropped, and counted."""
+    """Finds frames in the bytes of a line; what is damaged is dropped, and counted on from `damaged`."""
 
-    def __init__(self) -> None:
+    def __init__(self, damaged: int = 0) -> None:
         self.buffer = bytearray()
         self.overlong = False
-        self.damaged = 0
+        self.damaged = damaged
 
     def feed(self, data: bytes) -> Iterator[Frame]:
         """The frames that these bytes complete."""

@@ -77,6 +77,11 @@ class InProcessLink:
         """What there is to ask, of a host that was never reached."""
         return QUESTION
 
+    @property
+    def damaged(self) -> int:
+        """Nothing: a message is handed over as it is."""
+        return 0
+
     async def run(self, listener: LinkListener) -> None:
         """Be reached until cancelled."""
         self.listener = listener

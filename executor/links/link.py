@@ -118,6 +118,11 @@ class Link(Protocol):
         """What there is to ask, of a host that was never reached."""
         ...
 
+    @property
+    def damaged(self) -> int:
+        """How much that came was dropped, as it was damaged or no message."""
+        ...
+
     async def run(self, listener: LinkListener) -> None:
         """Serve until cancelled; raises `InputError` F5021 where the link cannot be opened."""
         ...

@@ -154,6 +154,11 @@ class SerialLink:
         """What there is to ask, of a host that was never reached."""
         return "is its host started, at this line, and with the same --baud?"
 
+    @property
+    def damaged(self) -> int:
+        """How many frames were dropped, as they were damaged or no message."""
+        return self.reader.damaged
+
     async def run(self, listener: LinkListener) -> None:
         """Serve until cancelled; raises `InputError` F5021 where the port cannot be opened, or breaks."""
         loop = asyncio.get_running_loop()
@@ -163,7 +168,7 @@ class SerialLink:
             raise cannot_open(self.port, port_reason(error)) from None
         descriptor = self.line.fileno()
         # It may have run before: whoever was heard then is met anew, and meets somebody else.
-        self.instance, self.reader, self.polled = os.urandom(8).hex(), FrameReader(), -1
+        self.instance, self.reader, self.polled = os.urandom(8).hex(), FrameReader(self.damaged), -1
         self.peers = {address: _Peer() for address in self.peers}
         self.unsent.clear()
         self.listener = listener

@@ -117,6 +117,7 @@ class ZenohLink:
         self.publishers: dict[tuple[str, str, str], zenoh.Publisher] = {}
         """For each sender here, receiver and session of the receiver."""
         self.damaged = 0
+        """How much that came was no message."""
         self.samples: deque[tuple[bool, str, bytes, bool]] = deque()
         """What has come and was not looked at yet: messages, and tokens of hosts."""
         self.is_woken = False

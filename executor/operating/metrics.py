@@ -92,6 +92,8 @@ class Metrics:
         )
         self.rounds = Counter("firable_rounds", "Rounds of votes, by how they ended", ["outcome"], registry=registry)
         self.repeats = Counter("firable_repeats", "Messages sent again, unanswered so far", registry=registry)
+        damaged = "What came over the link and was dropped, damaged or no message"
+        self.damaged = Counter("firable_link_damaged", damaged, registry=registry)
         self.faults = Counter(
             "firable_faults", "Faults, divergences and emergency stops told", ["kind"], registry=registry
         )
@@ -167,6 +169,10 @@ class Metrics:
     def inputs_coalesced(self, signal: str, changes: int) -> None:
         """Count changes of a signal that a driver saw and could not hand over one by one."""
         self.coalesced.labels(signal).inc(changes)
+
+    def came_damaged(self, count: int) -> None:
+        """Count what came over the link, and was dropped."""
+        self.damaged.inc(count)
 
     def text(self) -> bytes:
         """All figures in Prometheus' text format."""

@@ -177,13 +177,15 @@ async def terminable(host: Host) -> Situation:
 
 
 class Inputs:
-    """The figures of what the driver of a host reads, brought up to date when somebody asks for them."""
+    """The figures of what driver and link of a host read, brought up to date when somebody asks for them."""
 
     def __init__(self, host: Host, figures: Metrics) -> None:
         self.host = host
         self.figures = figures
         self.counted: Counter[str] = Counter()
         """What the figures have of the changes that were coalesced."""
+        self.damaged = 0
+        """What they have of what came damaged."""
 
     def look(self) -> None:
         """Take what was read since the last look."""
@@ -193,6 +195,9 @@ class Inputs:
         for signal, new in (now - self.counted).items():
             self.figures.inputs_coalesced(signal, new)
         self.counted = now
+        damaged = self.host.link.damaged if self.host.link is not None else 0
+        self.figures.came_damaged(damaged - self.damaged)
+        self.damaged = damaged
 
 
 async def _serving(host: Host, service: Service, figures: Metrics, page: Page | None = None) -> Situation:

@@ -26,7 +26,6 @@ class Disk:
         """The probability that a sync fails."""
         self.durable: dict[str, Any] = {}
         self.unsynced: list[Mapping[str, Any]] = []
-        self.syncs = 0
 
     def kept(self) -> Mapping[str, Any]:
         """What a process finds that starts now."""
@@ -40,7 +39,6 @@ class Disk:
         """Make durable the first so many batches; raises `DiskFailedError`, and then a first part of them may be."""
         if self.failing and self.draw.random() < self.failing:
             raise DiskFailedError
-        self.syncs += 1
         self._keep(batches)
 
     def crash(self) -> int:

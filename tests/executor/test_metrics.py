@@ -14,6 +14,8 @@ from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.driver import Reading
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import MemoryJournal
+from firable.executor.links.in_process import Exchange, InProcessLink
+from firable.executor.links.link import Greeting
 from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.host import Host
 from firable.executor.operating.metrics import Metrics
@@ -142,3 +144,25 @@ def test_what_was_coalesced_is_counted_on_by_the_driver_that_follows_an_emergenc
         inputs.look()
         counted.append(samples(metrics)["firable_coalesced_inputs_total", ("robot.touch",)])
     assert counted == [5, 13, 24]
+
+
+class NoisyLink(InProcessLink):
+    """A link over which that much has come damaged."""
+
+    noise = 0
+
+    @property
+    def damaged(self) -> int:
+        return self.noise
+
+
+def test_what_came_damaged_over_the_link_is_counted_once() -> None:
+    metrics, link = Metrics(NET), NoisyLink(Exchange(), Greeting("", ("robot",)))
+    driver = DryRunDriver(split(NET).subnets, 1.0)
+    inputs = Inputs(Host(split(NET), driver, Recorder(NET, "", None), machines=("robot",), link=link), metrics)
+    counted = []
+    for noise in (0, 3, 3, 5):
+        link.noise = noise
+        inputs.look()
+        counted.append(samples(metrics)["firable_link_damaged_total", ()])
+    assert counted == [0, 3, 3, 5]

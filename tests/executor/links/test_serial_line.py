@@ -98,8 +98,7 @@ def test_on_a_noisy_line_messages_are_lost_and_none_is_damaged(noise: dict[str, 
                 for name, value in noise.items():
                     setattr(rig, name, value)
                 sent, number = set(), 0
-                readers = [here.reader, *(station.reader for station in stations)]
-                while sum(reader.damaged for reader in readers) < 20 or len(a.messages) < 50:
+                while sum(link.damaged for link in (here, *stations)) < 20 or len(a.messages) < 50:
                     number += 1
                     for name in CONTROLLERS[:3]:
                         message = Decision(name, number, f"G{number}", 0, 0)
