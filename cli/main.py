@@ -16,9 +16,8 @@ import os
 import sys
 from collections.abc import Sequence
 from copy import copy
-from functools import wraps
 from importlib import import_module
-from typing import Any, TextIO
+from typing import TextIO
 
 import click
 
@@ -92,7 +91,7 @@ class _Commands(click.Group):
             return None
         module, _, function = COMMANDS[cmd_name].rpartition(".")
         command: click.Command = getattr(import_module(f"firable.cli.{module}"), function)
-        return _demanding_names(command)
+        return _demanding(command)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -105,24 +104,41 @@ class _Commands(click.Group):
         return super().resolve_command(ctx, args)
 
 
-def _demanding_names(command: click.Command) -> click.Command:
-    """The command, which refuses an empty argument: as a path that would be the folder in which the command runs."""
-    run = command.callback
-    if run is None:
-        return command
-
-    @wraps(run)
-    def checked(*given: Any, **named: Any) -> Any:
-        context = click.get_current_context()
-        for parameter in command.params:
-            value = context.params.get(parameter.name or "")
-            if _is_empty(value) and value != parameter.default and parameter.name not in MAY_BE_EMPTY:
-                raise click.BadParameter("it is empty", context, parameter)
-        return run(*given, **named)
-
+def _demanding(command: click.Command) -> click.Command:
+    """A command, or a group of them, that demands what `_Demanding` does."""
+    if not isinstance(command, click.Group):
+        return _Demanding(command)
     demanding = copy(command)
-    demanding.callback = checked
+    demanding.commands = {name: _demanding(one) for name, one in command.commands.items()}
     return demanding
+
+
+class _Demanding(click.Command):
+    """A command that refuses an empty argument, as a path that would be the folder in which the command runs, and an
+    option that is given twice and has one value, of which click takes the last."""
+
+    def __init__(self, command: click.Command) -> None:
+        super().__init__(command.name)
+        vars(self).update(vars(command))
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Read what the command is given; raises `click.UsageError`."""
+        _, _, given = self.make_parser(ctx).parse_args(list(args))
+        rest = super().parse_args(ctx, args)
+        if ctx.resilient_parsing:  # a line that a shell is about to complete
+            return rest
+        for parameter in self.params:
+            if isinstance(parameter, click.Option) and _has_one_value(parameter) and given.count(parameter) > 1:
+                raise click.BadParameter("it is given more than once, and has one value", ctx, parameter)
+            value = ctx.params.get(parameter.name or "")
+            if _is_empty(value) and value != parameter.default and parameter.name not in MAY_BE_EMPTY:
+                raise click.BadParameter("it is empty", ctx, parameter)
+        return rest
+
+
+def _has_one_value(option: click.Option) -> bool:
+    """Whether an option says one thing of several: neither a list nor a flag that is up however often it is given."""
+    return not option.multiple and not (option.is_flag and not option.secondary_opts)
 
 
 def _is_empty(value: object) -> bool:

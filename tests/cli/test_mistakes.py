@@ -197,6 +197,37 @@ def test_an_empty_name_is_refused_and_never_the_folder_that_the_command_runs_in(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["rehearse", "cell.bundle", "--seed", "1", "--seed", "2"], "--seed"),
+        (["check", "catalogue:one_robot", "--method", "auto", "--method=symbolic"], "--method"),
+        (["check", "catalogue:one_robot", "--progress", "--no-progress"], "--progress"),
+        (["draw", "catalogue:one_robot", "-o", "a.svg", "--output", "b.svg"], "-o"),
+        (["ci", "init", "--for", "gitlab", "--for", "gitlab"], "--for"),
+    ],
+)
+def test_an_option_of_one_value_that_is_given_twice_is_refused_and_none_of_them_is_taken(
+    arguments: list[str],
+    named: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "cell.bundle").touch()
+    said = refused(capsys, *arguments)
+    assert f"Error: Invalid value for '{named}'" in said
+    assert said.endswith(": it is given more than once, and has one value\n")
+    assert [path.name for path in tmp_path.iterdir()] == ["cell.bundle"]
+
+
+def test_a_list_and_a_flag_may_be_given_twice(tmp_path: Path) -> None:
+    (tmp_path / "net.firable.yaml").write_text(NET)
+    lists = ["--query", "EF robot.busy", "--query", "EF robot.free"]
+    assert main(["check", str(tmp_path / "net.firable.yaml"), "-v", "-v", *lists]) == 0
+
+
 def test_all_tasks_of_a_net_without_any_are_no_mistake(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["draw", "catalogue:machines-2", "--collapse", "all"]) == 0
     folded = capsys.readouterr().out

@@ -146,18 +146,23 @@ INTERRUPT, TERMINATE = signal.SIGINT, signal.SIGTERM
 
 @pytest.mark.parametrize(
     ("steps", "sent"),
-    [([], INTERRUPT), (["--step"], INTERRUPT), (["--step", "--speed", "max"], INTERRUPT), ([], TERMINATE)],
+    [
+        (["--speed", "1"], INTERRUPT),
+        (["--speed", "1", "--step"], INTERRUPT),
+        (["--speed", "max", "--step"], INTERRUPT),
+        (["--speed", "1"], TERMINATE),
+    ],
 )
 def test_interrupt_and_terminate_end_a_run_in_order(
     steps: list[str], sent: signal.Signals, bundle: str, tmp_path: Path
 ) -> None:
     trace = tmp_path / "trace"
-    options = ["--speed", "1", *LATE, "--trace", str(trace), *steps]
+    options = [*LATE, "--trace", str(trace), *steps]
     command = [sys.executable, "-m", "firable.cli", "run", bundle, *options]
     pipe = subprocess.PIPE
     with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) as process:
         assert process.stdout is not None
-        if steps:
+        if "--step" in steps:
             shown = ""
             with heard_in_time(process):
                 while not shown.endswith("[s] stop now: "):
