@@ -213,6 +213,10 @@ class Binding:
         """A diagnostic at a path of the file."""
         return _problem(self.source, self.tree, code, path, message, hint)
 
+    def is_one(self, name: str, other: str) -> bool:
+        """Whether two of its devices are one, or stand at one address."""
+        return _is_one(self.document, self.options, name, other)
+
     def unreadable(self) -> Iterator[Diagnostic]:
         """The files of its devices that cannot be read (F1001, F1003): certificates and keys.
 
@@ -305,6 +309,13 @@ def read_binding(path: Path | str) -> Binding:
 def parse_binding(text: str, file: str = "<binding>") -> Binding:
     """Read a binding from text, as `read_binding` does."""
     return _parse(Source(file, text))
+
+
+def _is_one(document: BindingDocument, options: Mapping[str, Options], name: str, other: str) -> bool:
+    if name == other or other not in document.devices:
+        return name == other
+    is_alike = document.devices[name].driver == document.devices[other].driver
+    return is_alike and options[name].far_end() == options[other].far_end()
 
 
 def _problem(source: Source, tree: Node, code: str, path: TreePath, message: str, hint: str) -> Diagnostic:
@@ -424,10 +435,7 @@ class _Reading:
 
     def is_one(self, name: str, other: str) -> bool:
         """Whether two devices are one, or stand at one address."""
-        if name == other or other not in self.document.devices:
-            return name == other
-        is_alike = self.document.devices[name].driver == self.document.devices[other].driver
-        return is_alike and self.options[name].far_end() == self.options[other].far_end()
+        return _is_one(self.document, self.options, name, other)
 
     def is_written_with(self, bound: SignalDocument, contact: EmergencyDocument) -> bool:
         """Whether what is written to a signal changes what a contact of the same device shows."""

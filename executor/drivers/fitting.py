@@ -6,7 +6,9 @@ like a machine that is slow. So both are refused before anything is connected, a
 So are two commands that are written alike, such as a stop that was copied from the line of a start and not edited: the
 machine would do the one for the other. Only machine and word are compared: a gripper may close in one way everywhere.
 And so is a channel with commands of two machines of two controllers: it is for one machine, which does one thing at a
-time, and these may be at work at once. An arm and its gripper, of one controller, may be one program's.
+time, and these may be at work at once. An arm and its gripper, of one controller, may be one program's. For the same
+reason no two such commands write different values to one point, each before a number of its own: whoever takes its
+number late would find what the other needs. A signal has no such rule: two may look at one sensor.
 """
 
 from __future__ import annotations
@@ -14,13 +16,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from firable.executor.drivers.binding import ACKNOWLEDGED, Binding, writes
-from firable.executor.drivers.device import Point
+from firable.executor.drivers.device import Point, Value
 from firable.nets.diagnostics import Diagnostic, did_you_mean
 from firable.nets.net import Command, Net, Place, SignalKind
 
 
 def misfits(binding: Binding, net: Net) -> tuple[Diagnostic, ...]:
-    """Where a binding does not fit a net (F5101), or gives a channel commands of two machines, or alike (F5102)."""
+    """Where a binding does not fit a net (F5101), or commands of two machines stand in each other's way (F5102)."""
     return tuple(_misfits(binding, net))
 
 
@@ -70,6 +72,7 @@ def _misfits(binding: Binding, net: Net) -> Iterator[Diagnostic]:
     bound = [place for place in places.values() if place.name in document.commands]
     yield from _alike(binding, bound)
     yield from _crowded(binding, bound)
+    yield from _contrary(binding, bound)
 
 
 def _unanswered(binding: Binding, place: Place) -> Iterator[Diagnostic]:
@@ -108,12 +111,37 @@ def _crowded(binding: Binding, places: Iterable[Place]) -> Iterator[Diagnostic]:
         bound = binding.document.commands[place.name]
         others = given.setdefault((bound.device, bound.channel), [])
         machine = _machine(place)
-        if other := next((one for one in others if one.owner != place.owner and _machine(one) != machine), None):
+        if other := next((one for one in others if _are_apart(one, place)), None):
             such = f"'{_machine(other)}', such as '{other.name}'"
             message = f"'{bound.channel}' has commands of {such}, and here of '{machine}'"
             hint = "a channel is for one machine, which does one thing at a time: name the channel of this one"
             yield binding.problem("F5102", ("commands", place.name, "channel"), message, hint)
         others.append(place)
+
+
+def _contrary(binding: Binding, places: Iterable[Place]) -> Iterator[Diagnostic]:
+    """Commands that write another value to a point than those of another machine, from another controller, write."""
+    commands = binding.document.commands
+    written: dict[Point, list[tuple[Place, Value]]] = {}
+    for place in places:
+        bound = commands[place.name]
+        for point, value in writes(bound.write):
+            others = written.setdefault(point, [])
+            for other, instead in others:
+                at = commands[other.name]
+                is_one = _are_apart(other, place) and binding.is_one(at.device, bound.device)
+                if is_one and value != instead and (at.device, at.channel) != (bound.device, bound.channel):
+                    message = f"{place.command} writes {value} to '{point}' of '{bound.device}'"
+                    message += f", and {other.command} of '{other.name}' writes {instead} there"
+                    hint = "both may be under way at once: give the commands of each machine points of their own"
+                    yield binding.problem("F5102", ("commands", place.name, "write", point), message, hint)
+                    break
+            others.append((place, value))
+
+
+def _are_apart(one: Place, other: Place) -> bool:
+    """Whether the commands of two places are for two machines, and of two controllers, so that none waits for one."""
+    return one.owner != other.owner and _machine(one) != _machine(other)
 
 
 def _machine(place: Place) -> str:

@@ -78,11 +78,9 @@ def _written_elsewhere(
     devices = binding.document.devices
     if not of_devices[name].issubset(here):
         return
-    ends = {device: options.far_end() for device, options in binding.options.items()}
     for other, of in of_devices.items():
-        same = devices[other].driver == devices[name].driver and ends[other] == ends[name]
-        both = sorted(_written(devices[name]) & _written(devices[other])) if same and of.isdisjoint(here) else []
-        if both:
+        same = of.isdisjoint(here) and binding.is_one(name, other)
+        if both := sorted(_written(devices[name]) & _written(devices[other])) if same else []:
             points = " and ".join(f"'{point}'" for point in both)
             message = f"'{name}' writes {points}, as '{other}' does, which is another host's at the same address"
             hint = "give each safe outputs, a heartbeat and channels of its own"

@@ -361,6 +361,38 @@ def test_a_channel_is_for_one_machine_where_two_controllers_may_give_it_commands
     assert [one.span.line for one in found if one.span is not None] == [19] * is_refused
 
 
+@pytest.mark.parametrize("machine", ["N", "M"])
+@pytest.mark.parametrize(
+    ("written", "another", "is_refused"),
+    [
+        ("holding 2: 9", "", True),
+        ("holding 2: 7", "", True),  # as M.move does, and M.stop does not
+        ("holding 6: 9", "", False),
+        ("holding 2: 9", "10.0.0.1", True),
+        ("holding 2: 9", "10.0.0.2", False),
+    ],
+)
+def test_two_machines_that_may_be_at_work_at_once_are_not_told_different_things_at_one_point(
+    written: str, another: str, is_refused: bool, machine: str
+) -> None:
+    given = f"{{start: x, places: {{x: , y: {{send: {{machine: {machine}, command: RUN}}}}}}}}"
+    text = NET_TEXT.replace("transitions:", f"  B: {given}\ntransitions:")
+    net = parse_net(f"{text}  t4: {{from: B.x, to: B.y}}\n  t5: {{from: B.y, to: B.x}}\n")
+    channel = "channels: {O: {number: holding 7}}"
+    bound = edited("signals:", f"  second: {{driver: modbus-tcp, host: {another}, {channel}}}\nsignals:")
+    to = "device: second, channel: O" if another else "device: plc, channel: N"
+    binding = parse_binding(f"{bound if another else GOOD}  B.y: {{{to}, write: {{{written}}}}}\n")
+    found = [(one.code, one.subject) for one in misfits(binding, net)]
+    point = ("commands", "B.y", "write", "holding 2")
+    assert found == ([("F5102", point)] if is_refused and machine == "N" else [])
+
+
+def test_two_signals_may_be_read_at_one_point() -> None:
+    net = parse_net(NET_TEXT.replace("inputs: there", "inputs: [there, gone]"))
+    both = edited("  M.moved: acknowledged", "  M.gone: {device: plc, read: discrete 0}\n  M.moved: acknowledged")
+    assert misfits(parse_binding(both), net) == ()
+
+
 def test_it_is_for_one_machine_in_whatever_order_its_places_stand() -> None:
     text = NET_TEXT.replace(
         "transitions:", "  B: {start: x, places: {x: , y: {send: {machine: M, command: RUN}}}}\ntransitions:"
