@@ -83,16 +83,17 @@ def _told(_kind: str, sentence: str) -> None:
 
 
 def _if_not_reported(tell: Callable[[str, str], None], kind: str, sentence: str) -> None:
-    """Tell what the report does not: a word of no use, an emergency stop that can be reset, a disk that hangs, that the
-    machines are not watched, an error that nobody has handled.
+    """Tell what the report does not: a new journal, a word of no use, an emergency stop that can be reset, a disk that
+    hangs, that the machines are not watched, an error that nobody has handled.
     """
     from firable.executor.operating.disk_watch import ANSWERS, HANGS
     from firable.executor.operating.latch import LATCHED
+    from firable.executor.operating.lives import BEGINS
     from firable.executor.operating.log import UNHANDLED
     from firable.executor.operating.restart import UNASKED
     from firable.executor.operating.watching import UNWATCHED
 
-    if kind in {UNASKED, LATCHED, HANGS, ANSWERS, UNWATCHED, UNHANDLED}:
+    if kind in {BEGINS, UNASKED, LATCHED, HANGS, ANSWERS, UNWATCHED, UNHANDLED}:
         tell(kind, sentence)
 
 

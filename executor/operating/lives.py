@@ -8,7 +8,7 @@ is of all lives: at the terminal one person is asked, whatever happens to the ce
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from firable.executor.drivers.driver import Latched
 from firable.executor.operating import ending, latch, restart
@@ -17,15 +17,18 @@ from firable.executor.operating.latch import Latch
 from firable.executor.operating.situation import Situation
 from firable.executor.operating.uncut import uncut
 from firable.nets.diagnostics import InputError
+from firable.nets.source import printable
 
 if TYPE_CHECKING:
     from firable.executor.operating.host import Host
 
+BEGINS: Final = "begins"
+"""The kind of what is told of a run that no journal holds yet."""
+
 
 async def to_the_end(run: Host) -> Situation:
     """Live until the end of the last life; returns how it ended."""
-    if run.log is not None:
-        run.log.began(run.net.name, [*run.coordinators, *run.controllers])
+    _tell_the_beginning(run)
     acts = run.conduct.operator
     operator = [] if acts is None else [asyncio.create_task(run.operate(acts), name="operator")]
     for task in operator:
@@ -53,6 +56,18 @@ async def to_the_end(run: Host) -> Situation:
     if run.log is not None:
         run.log.ended(ended)
     return ended
+
+
+def _tell_the_beginning(run: Host) -> None:
+    """Tell that the run begins; and that it does so at M0 where the journal is new, as one with a wrong name is."""
+    path = run.conduct.journal_path
+    is_new = path is not None and not any(map(run.journal.kept, run.machines))
+    if run.log is not None:
+        known = {} if path is None else {"journal": "new" if is_new else "taken up"}
+        run.log.began(run.net.name, [*run.coordinators, *run.controllers], **known)
+    if is_new:
+        where = "the run begins at the initial marking, and so must its machines"
+        run.tell_operator(BEGINS, f"the journal {printable(str(path))} is new: {where}")
 
 
 async def _live(run: Host) -> Situation | None:

@@ -75,11 +75,10 @@ class Log:
     def __init__(self, logger: logging.Logger) -> None:
         self.logger = logger
 
-    def began(self, net: str, machines: Iterable[str]) -> None:
-        """The host has begun to run."""
-        self._tell(
-            logging.INFO, "began", {"net": net, "machines": [machine or "the coordinator" for machine in machines]}
-        )
+    def began(self, net: str, machines: Iterable[str], **known: object) -> None:
+        """The host has begun to run; `known` is what else there is to say of that."""
+        named = [machine or "the coordinator" for machine in machines]
+        self._tell(logging.INFO, "began", {"net": net, "machines": named, **known})
 
     def seen(self, event: Event) -> None:
         """An event of the trace; votes and applications stand there alone."""

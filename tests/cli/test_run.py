@@ -325,6 +325,20 @@ def test_a_word_on_a_command_that_nobody_asks_after_is_told(
     assert "nobody asked after mc.fix" in capsys.readouterr().err
 
 
+def test_a_journal_that_is_new_is_told_of_and_one_that_is_taken_up_is_not(
+    bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    journal, log = str(tmp_path / "cell.journal"), tmp_path / "log"
+    arguments = ["run", bundle, "--workpieces", "1", "--journal", journal, "--resume", "--log", str(log)]
+    assert main(arguments) == 0
+    told = f"  the journal {journal} is new: the run begins at the initial marking, and so must its machines\n"
+    assert capsys.readouterr().err == told
+    assert main(arguments) == 0
+    assert "is new" not in capsys.readouterr().err
+    began = [line["journal"] for line in map(json.loads, log.read_text().splitlines()) if line["event"] == "began"]
+    assert began == ["new", "taken up"]
+
+
 def test_a_run_that_is_done_is_known_as_done_when_it_is_started_again(
     bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
