@@ -27,13 +27,15 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
 
-from firable.analysis.question import Answer, Question, no, yes
+from firable.analysis.question import LARGER, Answer, Question, no, unknown, yes
 from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
+from firable.nets.diagnostics import InputError
 from firable.nets.formula import And, Formula, Holds, Not, Or
 from firable.nets.net import ExternalGate, Net, Place, Signal, SignalKind, TimeLimit, Transition
 from firable.nets.tasks.model import Gate, Move, Task
 from firable.nets.time_limits import fault_transition, timer_name
-from firable.nets.verdict import Verdict, Weight, Witness
+from firable.nets.verdict import Cost, Verdict, Weight, Witness
+from firable.semantics.trace import Discipline
 
 MARKINGS_MAX: Final = 1_000_000
 AGAIN: Final = "again"
@@ -215,7 +217,13 @@ class _Block:
         weight: Weight = Weight.REQUIRED,
     ) -> Verdict:
         code = _CODE if weight is Weight.REQUIRED else ""
-        return Question(f"{self.task.name}.{name}", statement, weight, code, hint, _METHOD).ask(self.graph, find)
+        question = Question(f"{self.task.name}.{name}", statement, weight, code, hint, _METHOD)
+        try:
+            graph = self.graph
+        except InputError as error:  # there is no room for the net itself
+            answer = unknown(error.diagnostics[0].message, LARGER, error.diagnostics[0].code)
+            return question.settle(answer, _METHOD, Discipline.INTERLEAVING, Cost())
+        return question.ask(graph, find)
 
     def clean(self) -> Formula:
         """Nothing is left inside but the last steps, and what was released is idle."""

@@ -227,10 +227,11 @@ def test_gates_that_contradict_each_other_make_a_dead_move() -> None:
     assert "'a' has all that it comes from, but its gates want one signal both 1 and 0" in verdict.witness.note
 
 
-def test_a_budget_that_ends_proves_nothing() -> None:
-    proof = prove_block(task(SOUND), Budget(2))
+@pytest.mark.parametrize("budget", [Budget(2), Budget(memory_bytes=1)])
+def test_a_budget_that_ends_proves_nothing(budget: Budget) -> None:
+    proof = prove_block(task(SOUND), budget)
     assert not proof.sound
-    assert {verdict.status for verdict in proof.verdicts} == {Status.UNKNOWN}
+    assert {(verdict.status, verdict.code) for verdict in proof.verdicts} == {(Status.UNKNOWN, "F3004")}
 
 
 def test_the_end_may_not_be_reached_by_a_role_that_was_released() -> None:
