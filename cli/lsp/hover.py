@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from firable.nets.net import ExternalGate, Net, Place, SignalKind
 from firable.nets.occurrences import Kind, Occurrence
+from firable.nets.time_limits import format_time
 
 
 def hover(net: Net, one: Occurrence) -> str:
@@ -47,10 +48,20 @@ def _meaning(net: Net, gate: ExternalGate) -> str:
     kind = net.signal(gate.signal).kind
     if kind is SignalKind.SENSOR:
         return "a sensor"
-    commands = [f"{place.command}" for place in net.places if place.completion == gate.signal]
     if kind is SignalKind.TIMER:
-        return "a time limit that is over"
+        of = [f"`{place.name}`{_limit(place)}" for place in net.places if _timer(place) == gate.signal]
+        return f"the time limit of {' and '.join(of)}"
+    commands = [f"{place.command}{_limit(place)}" for place in net.places if place.completion == gate.signal]
     return f"the completion of {' and '.join(commands)}"
+
+
+def _timer(place: Place) -> str | None:
+    return place.within.timer if place.within else None
+
+
+def _limit(place: Place) -> str:
+    """How long the command of a place may take, where its file says so."""
+    return f" (within {format_time(place.within.milliseconds)})" if place.within else ""
 
 
 def _place(net: Net, place: Place) -> Iterator[str]:
@@ -60,7 +71,7 @@ def _place(net: Net, place: Place) -> Iterator[str]:
         yield "It holds a token at the start."
         yield ""
     if place.command is not None:
-        until = f", and waits until `{place.completion}`" if place.completion else ""
+        until = f", and waits until `{place.completion}`{_limit(place)}" if place.completion else ""
         yield f"When a token enters, `{place.command}` is sent{until}."
         yield ""
     for words, names in (
@@ -84,7 +95,9 @@ def _signal(net: Net, name: str) -> Iterator[str]:
             yield f"- wanted {int(wanted)} by {', '.join(names)}"
     for place in net.places:
         if place.completion == name:
-            yield f"- cleared by `{place.command}` in `{place.name}`"
+            yield f"- cleared by `{place.command}` in `{place.name}`, which waits for it{_limit(place)}"
+        if _timer(place) == name:
+            yield f"- set when `{place.name}` has waited too long for `{place.completion}`{_limit(place)}"
 
 
 def _controller(net: Net, name: str) -> Iterator[str]:

@@ -15,8 +15,10 @@ from lsprotocol import types as lsp
 from pygls.exceptions import JsonRpcException
 from pygls.lsp.client import LanguageClient
 
+from firable.cli.lsp.hover import hover
 from firable.cli.lsp.server import _changed, _show
-from firable.nets.catalogue import catalogue_path
+from firable.nets.catalogue import catalogue_net, catalogue_path
+from firable.nets.occurrences import Kind, Occurrence
 from firable.nets.source import Source
 
 LATE = catalogue_path("one_robot_mc_late").read_text("utf-8")
@@ -173,6 +175,29 @@ def test_a_transition_tells_what_it_waits_for_and_names_lead_to_their_definition
         assert len(uses or ()) == LATE.count("grasp_cv1")
 
     within(tmp_path / "cell.firable.yaml", act)
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "told"),
+    [
+        (Kind.PLACE, "robot.back", "`R MOVE to=HOME` is sent, and waits until `robot.at_home` (within 5s)."),
+        (Kind.TRANSITION, "G5", "- `robot.at_home` is 1: the completion of R MOVE to=HOME (within 5s)"),
+        (
+            Kind.TRANSITION,
+            "robot.back_timeout",
+            "- `robot.back_overdue` is 1: the time limit of `robot.back` (within 5s)",
+        ),
+        (
+            Kind.SIGNAL,
+            "robot.back_overdue",
+            "- set when `robot.back` has waited too long for `robot.at_home` (within 5s)",
+        ),
+        (Kind.SIGNAL, "robot.at_home", "cleared by `R MOVE to=HOME` in `robot.back`, which waits for it (within 5s)"),
+        (Kind.TRANSITION, "G3", "- `robot.touch` is 1: the completion of R GRASP at=CV1 and R GRASP at=MC\n"),
+    ],
+)
+def test_a_time_limit_is_told_wherever_it_counts(kind: Kind, name: str, told: str) -> None:
+    assert told in hover(catalogue_net("one_robot_timed"), Occurrence(kind, name, 0, 0, 0))
 
 
 def test_a_rename_changes_the_text_or_says_why_not(tmp_path: Path, within: Within) -> None:
