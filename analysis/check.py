@@ -10,6 +10,7 @@
 3. *Settle the verdicts one by one* (`firable.analysis.settling`), where no technique could hold all markings: by
    techniques that know some at once, by a race of techniques for those that come down to goals, and by what follows.
    Where it was room that the explicit engine wanted for, a compact search tries to see all markings without a graph.
+   What the markings show that it has found by then, such as a deadlock, is kept.
 
 Under synchronous steps only the explicit engine knows the rule; there `auto` is `explicit`.
 
@@ -73,6 +74,7 @@ _ALONE_SECONDS: Final = 0.1
 """How long techniques that hold all markings are alone, before others begin beside them."""
 _SPACES_SHARE: Final = 0.6  # of the time, for techniques that hold all markings
 _KNOWING_SECONDS_MAX: Final = 30.0  # for what is known at once
+_SEEN_SHARE: Final = 0.25  # of the time that is left, for what the markings say that were found and are not all
 _COUNTING_SHARE: Final = 0.5  # of the time that is left, for all markings without a graph
 _COUNTING_SECONDS_MAX: Final = 120.0
 _LEARNT_FIRST: Final = frozenset(question.name for question in QUESTIONS)
@@ -167,7 +169,7 @@ class _Check:
             return self._explored(first)
         course = [f"the first {first.n_markings:,} markings are not all"]
         settling = self._settling()
-        ends: dict[str, str] = {}
+        ends: dict[str, ReachabilityGraph] = {}
         space = self._whole(settling, course, ends)
         if space is not None:  # sets may take far longer than one run that is nearby
             share = _share(self.deadline, _FORMULAS_SHARE)
@@ -176,8 +178,11 @@ class _Check:
         late = {Method.COMPACT: _COUNTING_SHARE} if {"memory", "markings"} & set(ends) else {}
         report = self._report(space or first, settling.found if space is None else settling.shown())
         if space is None:  # as far as anybody came, and not as far as was looked before the race
-            furthest = next((bound for reason, bound in ends.items() if reason in _OF_BUDGET), first.bound)
+            furthest = next((graph.bound for reason, graph in ends.items() if reason in _OF_BUDGET), first.bound)
             report = replace(report, verdicts=tuple(_reaching(of, first, furthest) for of in report.verdicts))
+            while ends:
+                course += self._settled_by(ends.popitem()[1], settling, report)
+        ends.clear()  # those who come now have all the memory
         return self._settled(report, settling, FIRST_KNOWERS | late, (*GOAL_LANES, *FORMULA_LANES), course)
 
     def _without_a_graph(self, error: InputError) -> CheckReport:
@@ -193,6 +198,14 @@ class _Check:
                 continue
             return _told(self._report(space), [*course, f"{of.words}: {_size(space)}"])
         raise InputError([replace(each, hint="give it a larger budget of memory") for each in error.diagnostics])
+
+    def _settled_by(self, graph: ReachabilityGraph, settling: Settling, report: CheckReport) -> list[str]:
+        """Settle what a part of the markings decides and is open yet, whatever the rest are; how that is told."""
+        seen = self._report(graph.until(_moment(self.deadline, _SEEN_SHARE)), settling.found)
+        open_ = {of.name for of in report.verdicts if of.status is Status.UNKNOWN} - settling.found.keys()
+        decided = {of.name: of for of in seen.verdicts if of.name in open_ and of.status is not Status.UNKNOWN}
+        settling.found |= decided
+        return [*seen.course, *([f"explored, and not all: {', '.join(sorted(decided))}"] if decided else [])]
 
     def _begin(self, settling: Settling, deadline: Deadline) -> None:
         """Settle, beside the search for all markings, what others follow from, by quick techniques."""
@@ -280,10 +293,12 @@ class _Check:
             self.net, self.discipline, budget, deadline=self.deadline, progress=self.progress, threads=threads
         )
 
-    def _whole(self, settling: Settling, course: list[str], ends: dict[str, str]) -> StateSpace[Any] | None:
+    def _whole(
+        self, settling: Settling, course: list[str], ends: dict[str, ReachabilityGraph]
+    ) -> StateSpace[Any] | None:
         """All markings, by whichever technique is first; None where none of them could hold them all.
 
-        `ends` is told how far the explicit engine came, by the reason why it ended. The settling is begun beside it,
+        `ends` is given what the explicit engine has found, by the reason why it ended. The settling is begun beside it,
         and given up where all markings are there.
         """
         limits = Limits(_share(self.deadline, _SPACES_SHARE), self.budget.memory_bytes)
@@ -311,8 +326,8 @@ class _Check:
         begun.result()
         return space
 
-    def _held_explicitly(self, ends: dict[str, str], limits: Limits) -> StateSpace[Any]:
-        """The graph; `ends` is told how far it came, by the reason why the engine ended."""
+    def _held_explicitly(self, ends: dict[str, ReachabilityGraph], limits: Limits) -> StateSpace[Any]:
+        """The graph; one that is not whole `ends` is given, by the reason why the engine ended."""
         budget = replace(self.budget, memory_bytes=limits.memory_bytes, seconds=None)
         try:
             graph = explore(
@@ -326,7 +341,8 @@ class _Check:
             )
         except InputError as error:  # a part of the memory does not hold the net itself, and others may need less
             raise BudgetExceeded(error.diagnostics[0].message) from None
-        ends[str(graph.engine.reason)] = graph.bound
+        if not graph.complete:
+            ends[str(graph.engine.reason)] = graph
         graph.require_complete()
         return graph
 

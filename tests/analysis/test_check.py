@@ -205,3 +205,22 @@ def test_an_unknown_verdict_says_how_far_the_budget_led_and_not_where_the_race_b
         bound = check(catalogue_net("one_robot"), budget=budget).verdict("home-markings").bound
         assert bound.startswith(f"{budget.markings} markings found")
         assert bound.endswith("the budget of markings is used up")
+
+
+def test_what_the_explicit_engine_has_found_is_kept_where_its_budget_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A violation is one whatever markings are left, and nothing is proved by some of them."""
+    monkeypatch.setattr(module, "SPACES", {})
+    for lanes in ("GOAL_LANES", "FORMULA_LANES", "_FIRST_LANES"):
+        monkeypatch.setattr(module, lanes, ())
+    monkeypatch.setattr("firable.analysis.settling.Settling.learn", lambda *_: None)
+    monkeypatch.setattr(module, "FIRST_MARKINGS", 5)
+    net, budget = catalogue_net("one_robot_mc_late"), Budget(60)
+    explored, raced = check(net, budget=budget, method="explicit"), check(net, budget=budget)
+    for name in ("deadlock-free", "machine-never-stopped", "property.no_deadlock"):
+        assert raced.verdict(name).status is Status.VIOLATED
+        assert raced.verdict(name).witness == explored.verdict(name).witness
+    assert raced.verdict("live").status is Status.VIOLATED, "it follows"
+    for name in ("contact-free", "home-markings"):
+        assert raced.verdict(name).status is Status.UNKNOWN
+    told = next(line for line in raced.course if line.startswith("explored, and not all: "))
+    assert "deadlock-free" in told
