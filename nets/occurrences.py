@@ -107,6 +107,8 @@ class Names:
     def __init__(self, source: Source) -> None:
         self.source = source
         self.tree = parse_tree(source)
+        self._folded: dict[tuple[int, int], Mapping[int, tuple[int, int] | None]] = {}
+        """Where the letters of a scalar over several lines stand, by where it begins."""
 
     @cached_property
     def occurrences(self) -> tuple[Occurrence, ...]:
@@ -358,14 +360,41 @@ class Names:
                     yield from _whole([scalar], "", Kind.PLACE)
 
     def _inside(self, scalar: Scalar, at: int, length: int) -> tuple[int, int] | None:
-        """Line and column of a part of a scalar, where the scalar stands in the text letter by letter."""
+        """Line and column of a part of a scalar, where it stands in the text letter by letter."""
         if not length or not 0 < scalar.line <= len(self.source.lines):
             return None
         line = self.source.lines[scalar.line - 1]
         begin = scalar.column - 1 + (0 if scalar.plain else 1)
-        if line[begin : begin + len(scalar.text)] != scalar.text:
-            return None
-        return scalar.line, begin + at + 1
+        if line[begin : begin + len(scalar.text)] == scalar.text:
+            return scalar.line, begin + at + 1
+        where = (scalar.line, scalar.column)
+        if where not in self._folded:
+            self._folded[where] = dict(enumerate(self._letters(scalar)))
+        letters = self._folded[where]
+        return letters.get(at) if at + length - 1 in letters else None
+
+    def _letters(self, scalar: Scalar) -> Iterator[tuple[int, int] | None]:
+        """Line and column of each letter of a scalar over several lines, whose ends and indents it has as blanks.
+
+        None for a blank; they end where the text has something else, as an escape between quotes is.
+        """
+        lines, row, column = self.source.lines, scalar.line - 1, scalar.column - 1
+        if not scalar.plain:
+            row, column = (row + 1, 0) if lines[row][column] in "|>" else (row, column + 1)
+        is_blank = True
+        for letter in scalar.text:
+            if letter.isspace():
+                is_blank = True
+                yield None
+                continue
+            while is_blank and row < len(lines):
+                column += len(lines[row][column:]) - len(lines[row][column:].lstrip())
+                if is_blank := column == len(lines[row]):
+                    row, column = row + 1, 0
+            if row == len(lines) or lines[row][column : column + 1] != letter:
+                return
+            column += 1
+            yield row + 1, column
 
 
 def _whole(scalars: Iterable[Scalar], prefix: str, *kinds: Kind) -> Iterator[_Use]:

@@ -226,6 +226,35 @@ def test_a_word_that_is_quoted_or_part_of_a_formula_is_found_where_it_stands() -
     assert replace(no, line=8, column=3, defines=True) in names.of(no)
 
 
+@pytest.mark.parametrize(
+    "formula",
+    [
+        "q and\n      not (@\n\n      and q->@)",
+        "'q and\n      not (@ and q->@)'",
+        '"q and\n\n      not (@ and q->@)"',
+        ">-\n      q and\n      not (@ and\n\n      q->@)",
+        "|  # said twice: p\n      q and\n        not (@\n      and q->@)\n",
+    ],
+)
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_a_word_of_a_formula_over_several_lines_is_found_where_it_stands(formula: str, newline: str) -> None:
+    text = "firable: 1\ncell: c\nplaces: {@: , q: }\nstart: @\ntransitions:\n  t: {from: @, to: q}\nproperties:\n"
+    text = f"{text}  apart:\n    never: {formula}\n".replace("\n", newline)
+    names = names_in(text.replace("@", "p"))
+    at = names.at(3, 10)
+    assert at is not None
+    assert names.renamed(at, "place") == text.replace("@", "place")
+    assert [written(names, one) for one in names.of(at)] == ["p"] * 5
+    parse_net(text.replace("@", "place"))
+
+
+def test_a_word_that_escapes_take_apart_is_left_alone() -> None:
+    text = 'firable: 1\ncell: c\nplaces: {p1: , q: }\nproperties: {apart: {never: "q and p\\\n  1 and p1"}}\n'
+    names = names_in(text)
+    assert [one.line for one in names.occurrences if one.name == "p1"] == [3]
+    assert [one.line for one in names.occurrences if one.name == "q"] == [3, 4]
+
+
 CONCEPTUAL = """\
 firable: 1
 cell: demo
