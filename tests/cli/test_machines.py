@@ -328,7 +328,7 @@ def test_the_parts_of_what_is_asked_of_a_loop_are_told_by_name_to_who_asks_for_a
     """They are many, and have names that stand in no file."""
     monkeypatch.setattr("firable.analysis.check.FIRST_MARKINGS", 200)
     monkeypatch.setattr("firable.analysis.check.SPACES", {})
-    limits = ["--max-markings", "300", "--max-seconds", "3", "--no-cache"]
+    limits = ["--max-markings", "300", "--max-seconds", "6", "--no-cache"]
     assert main(["check", CELL, "--machines", PLANT, *limits]) == 3
     brief = capsys.readouterr().out
     assert "property.loop.completion.1: " not in brief
