@@ -42,6 +42,7 @@ from firable.analysis.induction.smt import Operator, Term, Terms
 from firable.decompose.proofs.obligation import Obligation, claimed, facts
 from firable.decompose.proofs.sides import Sides
 from firable.decompose.splitting.cut import participants
+from firable.nets.layers import Layers
 from firable.nets.net import ArbitrationRule, Net
 
 
@@ -76,6 +77,10 @@ def _groups(sides: Sides) -> Obligation:
     for its in sides.decomposition.groups:
         made += _group_facts(its.name, its.sequence, its.rest, its.by, its.controller)
     made += [f"the coordinator decides {row.name}" for row in sides.decomposition.coordinated]
+    if not (tree := Layers(net)).several:  # there is the one; of several, O8 says which
+        named = [(row.at, row.name) for row in sides.decomposition.coordinated]
+        named += [(group.at, group.name) for group in sides.decomposition.groups]
+        made += [f"'{at}' decides {name}" for at, name in named if at not in {None, tree.root}]
     statement = "each conflict component is one group, decided by the coordinator where a global transition is in it"
     return facts("arbitration", statement, central, made)
 

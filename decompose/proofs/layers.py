@@ -145,7 +145,7 @@ def _deciders(sides: Sides, tree: Layers) -> Obligation:
     made += [
         f"'{group.at or tree.root}' decides the group {group.name}"
         for group in sides.decomposition.groups
-        if group.controller is None
+        if group.controller is None or group.at is not None
     ]
     return facts(
         "o8",

@@ -22,6 +22,7 @@ def ownership(sides: Sides) -> Iterator[Obligation]:
     central += [f"{c.name} has one subnet, without arbiters" for c in net.controllers]
     central += [f"{called(item.owner)} owns {item.name}" for item in _owned(net)]
     made = [f"controller {_json(c)}" for subnet in sides.subnets for c in subnet.controllers]
+    of_the_net = {part for t in net.transitions for part in sides.parts[t.name]}
     for subnet in sides.subnets:
         made.append(f"{subnet.name} has {'other subnets' if subnet.arbiters else 'one subnet, without arbiters'}")
         made += [f"{subnet.name} owns {item.name}" for item in _owned(subnet)]
@@ -32,8 +33,8 @@ def ownership(sides: Sides) -> Iterator[Obligation]:
         ]
         made += [
             f"{t.name} of {subnet.name} is a part of nothing"
-            for i, t in enumerate(subnet.transitions)
-            if sides.whole_of(subnet, i) not in net.transition_index
+            for t in subnet.transitions
+            if (subnet.name, t.name) not in of_the_net
         ]
     every = [part for parts in sides.parts.values() for part in parts]
     made += [f"{part} of {controller} is a part twice" for controller, part in repeated(every)]

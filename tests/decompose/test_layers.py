@@ -149,7 +149,9 @@ def test_a_row_decided_too_high_up_and_a_group_in_another_layer_are_refuted() ->
     groups = tuple(
         replace(group, at="cell_a") if group.name == "conflict-1" else group for group in decomposition.groups
     )
-    for edited in (replace(decomposition, coordinated=rows), replace(decomposition, groups=groups)):
+    own = tuple(replace(group, at="cell_a") if group.controller else group for group in decomposition.groups)
+    changed = [replace(decomposition, groups=its) for its in (groups, own)]
+    for edited in (replace(decomposition, coordinated=rows), *changed):
         assert [verdict.name for verdict in prove(edited).verdicts if not verdict.holds] == ["o8"]
 
 

@@ -285,6 +285,24 @@ def test_exchanged_or_missing_subnets_are_refuted() -> None:
         assert refuted(replace(decomposition, subnets=subnets))
 
 
+def test_part_that_stands_there_once_more_under_the_name_of_its_transition_is_refuted() -> None:
+    """It would fire by itself, without any vote; and no equation sees it, since the transition itself does the same."""
+    decomposition = split(gated_net())
+    again = replace(decomposition.subnet("b").transition("t1-11"), name="G")
+    alone = edited(decomposition, "b", lambda b: replace(b, transitions=(*b.transitions, again)))
+    assert set(refuted(alone)) == {"ownership"}
+
+
+def test_decider_in_a_net_of_one_layer_is_refuted() -> None:
+    """G and l are in conflict: with one of them decided elsewhere, both could be granted."""
+    decomposition = split(gated_net())
+    rows, groups = decomposition.coordinated, decomposition.groups
+    of_row = replace(decomposition, coordinated=(replace(rows[0], at="b"), *rows[1:]))
+    of_group = replace(decomposition, groups=(replace(groups[0], at="b"), *groups[1:]))
+    for elsewhere in (of_row, of_group):
+        assert set(refuted(elsewhere)) == {"arbitration"}
+
+
 def test_place_under_the_wrong_owner_is_refuted() -> None:
     decomposition = split(gated_net())
     a, b, c = decomposition.subnets
