@@ -91,8 +91,19 @@ def test_two_commands_that_one_signal_completes_do_not_contend_and_one_that_wait
     assert decided(commanding(asks=True)) == {"within": None, "over": None}
 
 
-def test_left_below_it_is_refuted() -> None:
-    decomposition = split(line_and_cell(over(gates=(("r.p",), ()))))
+@pytest.mark.parametrize(
+    "net",
+    [
+        line_and_cell(over(gates=(("r.p",), ()))),
+        line_and_cell(over(gates=((), ("r.q",)))),
+        line_and_cell(over(r="r.p")),
+        line_and_cell(Transition("over", ("r.s", "x.p"), ("r.q", "x.q"))),
+        commanding(asks=True),
+    ],
+    ids=["takes what is read", "fills what is read", "takes the same", "fills the same", "clears what is read"],
+)
+def test_left_below_it_is_refuted(net: Net) -> None:
+    decomposition = split(net)
     rows = tuple(replace(row, at="cell") if row.name == "within" else row for row in decomposition.coordinated)
     edited = replace(decomposition, coordinated=rows)
     assert [verdict.name for verdict in prove(edited).verdicts if not verdict.holds] == ["o8", "o8-apart"]

@@ -1,0 +1,70 @@
+"""Edits that one family alone refutes, or each of several: none is left out because another one sees it, too."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from firable.decompose.proofs.proving import prove
+from firable.decompose.splitting.cut import split
+from firable.nets.decomposition import Decomposition, Part
+from firable.nets.net import Controller, Net, Place, Transition
+
+NET = Net(
+    "light",
+    (Place("a.off", "a", marked=True), Place("a.on", "a"), Place("b.ok", "b", marked=True), Place("b.rest", "b")),
+    (
+        Transition("up", ("a.off",), ("a.on",), ("b.ok",), number=1),
+        Transition("down", ("a.on",), ("a.off",), ("b.ok",), number=2),
+        Transition("dim", ("a.on",)),
+        Transition("tire", ("b.ok",), ("b.rest",)),
+    ),
+    controllers=(Controller("a"), Controller("b")),
+)
+"""Both of its global transitions read one place of `b`; `dim` is in conflict with one of them, and local."""
+
+
+def refuted(decomposition: Decomposition) -> set[str]:
+    return {verdict.name for verdict in prove(decomposition).verdicts if not verdict.holds}
+
+
+def with_row(name: str, parts: tuple[Part, ...]) -> Decomposition:
+    whole = split(NET)
+    rows = tuple(replace(row, parts=parts) if row.name == name else row for row in whole.coordinated)
+    return replace(whole, coordinated=rows)
+
+
+def with_b(b: Net) -> Decomposition:
+    whole = split(NET)
+    return replace(whole, subnets=(whole.subnet("a"), b))
+
+
+def test_the_net_is_proved_as_it_is_split() -> None:
+    assert refuted(split(NET)) == set()
+
+
+def test_one_part_of_two_transitions_is_refuted_though_it_moves_nothing() -> None:
+    """One vote would be counted for both; no equation sees it, since both read the same."""
+    shared = with_row("down", (Part("a", "t1-21"), Part("b", "t2-12")))
+    b = split(NET).subnet("b")
+    subnets = (shared.subnet("a"), replace(b, transitions=tuple(t for t in b.transitions if t.name != "t2-22")))
+    assert refuted(replace(shared, subnets=subnets)) == {"ownership"}
+
+
+def test_place_that_its_subnet_says_nobody_owns_is_refuted() -> None:
+    b = split(NET).subnet("b")
+    assert refuted(with_b(replace(b, places=(replace(b.places[0], owner=None), *b.places[1:])))) == {"ownership"}
+
+
+def test_row_that_is_missing_is_refuted_of_its_transition_and_where_that_competes() -> None:
+    whole = split(NET)
+    assert [row.name for row in whole.coordinated] == ["up", "down", "dim"]
+    without = {row.name: tuple(r for r in whole.coordinated if r is not row) for row in whole.coordinated}
+    found = {name: refuted(replace(whole, coordinated=rows)) for name, rows in without.items()}
+    assert {name for name in found["up"] if name.startswith("o2.")} == {"o2.up"}
+    assert {name for name in found["down"] if name.startswith("o2.")} == {"o2.down", "o2.a.on"}
+    assert found["dim"] == {"o2.a.on", "arbitration"}
+
+
+def test_part_that_nobody_has_is_refuted_of_what_it_takes_part_in() -> None:
+    found = refuted(with_row("up", (Part("a", "t1-11"), Part("b", "t2-12"), Part("b", "nothing"))))
+    assert {"eq7.up", "eq8.up", "o3.up"} <= found
