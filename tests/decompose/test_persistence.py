@@ -24,18 +24,21 @@ from firable.decompose.splitting.cut import split
 from firable.decompose.splitting.persistence import WALK_VOTES, Persistence, persistence
 from firable.decompose.splitting.votes import FALSIFIERS_MAX, votes
 from firable.decompose.splitting.walking import RUN_MAX, fallen
+from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.formulas import Formulas
+from firable.decompose.verification.free_parts import check_free_parts
+from firable.decompose.verification.recut import Cut
 from firable.decompose.verification.votes import question_of
 from firable.decompose.verification.votes import votes as restated
+from firable.nets import knowledge
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net, family_net
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import Formula
-from firable.nets.knowledge import undisturbing
 from firable.nets.net import Command, Controller, ExternalGate, Net, Place, Signal, SignalKind, Transition
 from firable.nets.text import parse_net
-from firable.nets.verdict import Status
+from firable.nets.verdict import Status, Verdict
 from firable.semantics.algebra import BOOL
 from firable.semantics.firing import firable
 from firable.semantics.player import Player, holds_in
@@ -232,6 +235,22 @@ def crossing_net() -> Net:
     return Net("n", places, (transition, back), signals, (A, B))
 
 
+def undisturbing(decomposition: Decomposition) -> tuple[str, ...]:
+    """By the arcs, as both texts say: that of whoever makes a bundle, and that of its checker, who demands just these.
+
+    The checker is told that every vote is persistent.
+    """
+    found = knowledge.undisturbing(decomposition)
+    parts = [(row.name, part) for row in decomposition.coordinated for part in row.parts]
+    free = tuple((name, part.controller) for name, part in parts if part.name in found)
+    verdicts = tuple(Verdict(f"persistent.{part.name}", Status.PROVED, "it is", "a premise") for _, part in parts)
+    examination = Examination(Bundle(replace(decomposition, free=free), verdicts))
+    for verdict in verdicts:
+        examination.judge(verdict, shown=True, method="a premise")
+    check_free_parts(examination, Cut(decomposition.net))
+    return found
+
+
 def test_part_is_free_of_the_promise_where_it_takes_no_yes_back_and_its_gate_stays_open() -> None:
     net = crossing_net()
     assert undisturbing(split(net)) == ("t1-11", "t2-12")
@@ -262,7 +281,8 @@ def test_part_whose_output_another_fills_or_reads_as_empty_must_promise(other: T
 @pytest.mark.parametrize("gate", [ExternalGate("a.s"), ExternalGate("a.done", wanted=False)])
 def test_part_with_a_gate_that_may_close_must_promise(gate: ExternalGate) -> None:
     net = crossing_net()
-    places = tuple(replace(place, completion=None) for place in net.places)
+    p, r, q = net.places
+    places = (replace(p, completion=None), replace(r, command=p.command, completion=p.completion), q)
     crossing = replace(net.transitions[0], external=(gate,))
     assert undisturbing(split(replace(net, places=places, transitions=(crossing,)))) == ("t2-12",)
 
@@ -273,6 +293,32 @@ def test_part_whose_completion_another_command_clears_must_promise() -> None:
     places = (net.places[0], again, net.places[2])
     back = replace(net.transitions[1], external=(ExternalGate("a.done"),))
     assert undisturbing(split(replace(net, places=places, transitions=(net.transitions[0], back)))) == ("t2-12",)
+
+
+@pytest.mark.parametrize(
+    ("needs", "free"),
+    [(("a.r",), ("t2-12",)), (("a.p",), ("t1-11", "t2-12"))],
+    ids=["whatever it fills", "what it fills"],
+)
+def test_part_that_clears_what_another_reads_must_promise_unless_that_needs_what_it_fills(
+    needs: tuple[str, ...], free: tuple[str, ...]
+) -> None:
+    net = crossing_net()
+    crossing = Transition("t", ("b.q",), ("a.p",))
+    reading = Transition("u", needs, ("a.r",) * (needs == ("a.p",)), external=(ExternalGate("a.done"),))
+    assert undisturbing(split(replace(net, transitions=(crossing, reading)))) == free
+
+
+@pytest.mark.parametrize(("wanted", "free"), [(False, ("t2-12",)), (True, ("t1-11", "t2-12"))])
+@pytest.mark.parametrize("reads_full", [True, False])
+def test_part_whose_gate_a_completion_alone_keeps_another_from_closing_must_promise(
+    reads_full: bool, wanted: bool, free: tuple[str, ...]
+) -> None:
+    net, gate = crossing_net(), ("a.k",)
+    other = Transition("u", gate * reads_full, gate * (not reads_full), external=(ExternalGate("a.done", wanted),))
+    crossing = replace(net.transitions[0], permissive=gate * reads_full, inhibitive=gate * (not reads_full))
+    places = (*net.places, Place("a.k", "a", marked=reads_full))
+    assert undisturbing(split(replace(net, places=places, transitions=(crossing, other)))) == free
 
 
 TAKEN_BY_COMPLETION = """\

@@ -7,7 +7,7 @@ from dataclasses import replace
 from firable.decompose.proofs.proving import prove
 from firable.decompose.splitting.cut import split
 from firable.nets.decomposition import Decomposition, Part
-from firable.nets.net import Controller, Net, Place, Transition
+from firable.nets.net import Arbiter, Controller, Net, Place, Transition
 
 NET = Net(
     "light",
@@ -53,6 +53,12 @@ def test_one_part_of_two_transitions_is_refuted_though_it_moves_nothing() -> Non
 def test_place_that_its_subnet_says_nobody_owns_is_refuted() -> None:
     b = split(NET).subnet("b")
     assert refuted(with_b(replace(b, places=(replace(b.places[0], owner=None), *b.places[1:])))) == {"ownership"}
+
+
+def test_subnet_with_an_arbiter_of_its_own_is_refuted() -> None:
+    """Conflicts are decided by the groups of the table."""
+    b = split(NET).subnet("b")
+    assert refuted(with_b(replace(b, arbiters=(Arbiter("own", ("t2-12", "tire")),)))) == {"ownership"}
 
 
 def test_row_that_is_missing_is_refuted_of_its_transition_and_where_that_competes() -> None:
