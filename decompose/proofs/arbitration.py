@@ -51,7 +51,7 @@ def arbitration(sides: Sides) -> Iterator[Obligation]:
     yield _groups(sides)
     central = Competition.of([(sides.net, lambda t: sides.net.transitions[t].name)])
     subnets = Competition.of((subnet, partial(sides.whole_of, subnet)) for subnet in sides.subnets)
-    for name in dict.fromkeys([*sides.central_groups, *sides.groups]):
+    for name in sides.central_groups:  # that there are no others is one of the facts
         yield _equivalence(sides, name, central, subnets)
 
 
@@ -211,11 +211,9 @@ def choice(
 def _equivalence(sides: Sides, name: str, competition: Competition, in_subnets: Competition) -> Obligation:
     net, terms = sides.net, Terms()
     steps = Steps(terms)
-    central, its = sides.central_groups.get(name), sides.groups.get(name)
-    sequence, rest = (
-        ([net.transitions[t].name for t in part] for part in (central.sequence, central.rest)) if central else ([], [])
-    )
-    wanted = choice(terms, steps, sequence, rest, competition, turns=central is not None and _turns(central.by))
+    central, its = sides.central_groups[name], sides.groups.get(name)
+    sequence, rest = ([net.transitions[t].name for t in part] for part in (central.sequence, central.rest))
+    wanted = choice(terms, steps, sequence, rest, competition, turns=_turns(central.by))
     given = Choice({}, {})
     if its is not None:
         given = choice(terms, steps, its.sequence, its.rest, in_subnets, turns=_turns(its.by))

@@ -36,10 +36,9 @@ class Sides:
         local: dict[str, list[Key]] = {}
         for subnet in self.subnets:
             for transition in subnet.transitions:
-                if transition.name not in self.parts:  # local, under its own name, wherever it stands
-                    local.setdefault(transition.name, []).append((subnet.name, transition.name))
+                local.setdefault(transition.name, []).append((subnet.name, transition.name))
         for transition in self.net.transitions:
-            if transition.name not in self.parts:
+            if transition.name not in self.parts:  # local, under its own name, wherever it stands
                 self.parts[transition.name] = tuple(local.get(transition.name, ()))
 
     def part(self, key: Key) -> tuple[Net, int] | None:

@@ -309,13 +309,20 @@ def test_part_that_clears_what_another_reads_must_promise_unless_that_needs_what
     assert undisturbing(split(replace(net, transitions=(crossing, reading)))) == free
 
 
-@pytest.mark.parametrize(("wanted", "free"), [(False, ("t2-12",)), (True, ("t1-11", "t2-12"))])
+@pytest.mark.parametrize(
+    ("read", "free"),
+    [
+        (ExternalGate("a.done", wanted=False), ("t2-12",)),
+        (ExternalGate("a.done"), ("t1-11", "t2-12")),
+        (ExternalGate("a.s", wanted=False), ("t1-11", "t2-12")),
+    ],
+)
 @pytest.mark.parametrize("reads_full", [True, False])
 def test_part_whose_gate_a_completion_alone_keeps_another_from_closing_must_promise(
-    reads_full: bool, wanted: bool, free: tuple[str, ...]
+    reads_full: bool, read: ExternalGate, free: tuple[str, ...]
 ) -> None:
     net, gate = crossing_net(), ("a.k",)
-    other = Transition("u", gate * reads_full, gate * (not reads_full), external=(ExternalGate("a.done", wanted),))
+    other = Transition("u", gate * reads_full, gate * (not reads_full), external=(read,))
     crossing = replace(net.transitions[0], permissive=gate * reads_full, inhibitive=gate * (not reads_full))
     places = (*net.places, Place("a.k", "a", marked=reads_full))
     assert undisturbing(split(replace(net, places=places, transitions=(crossing, other)))) == free
