@@ -217,6 +217,7 @@ impl Saturation {
     ) -> Result<(), Stop> {
         let events = shop.agenda.at(block);
         let (mut idle, to) = (0, block - 1);
+        let mut added = matches!(self.frames.last(), Some(Frame::Fix { added: true, .. }));
         while idle <= self.values.len() - base as usize {
             if event == 0 && !std::mem::take(&mut self.values[at as usize].grown) {
                 idle += 1;
@@ -226,26 +227,35 @@ impl Saturation {
             (idle, event) = (0, event.max(1));
             while let Some(part) = events.get(event as usize - 1) {
                 let value = self.values[at as usize];
+                if !part.fires(value.bits) {
+                    event += 1;
+                    continue;
+                }
                 let bits = value.bits ^ part.flip;
-                let target = if part.fires(value.bits) { shop.inside(within, block, bits) } else { EMPTY };
+                let target = shop.inside(within, block, bits);
                 let known = self.known(shop, part.next, value.node, target, to);
                 if known != Some(EMPTY) {
                     self.events += 1;
-                    // What follows may fail, or be gone on with later.
-                    if let Some(Frame::Fix { at: reached, event: next, .. }) = self.frames.last_mut() {
-                        (*reached, *next) = (at, event);
+                    let Some(set) = known else {
+                        self.stand_at(at, event, added);
+                        return self.below(shop, part.next, value.node, target, to);
+                    };
+                    match self.add(shop, base, bits, set, target, watch) {
+                        Ok(more) => added |= more,
+                        Err(stop) => {
+                            self.stand_at(at, event, added);
+                            return Err(stop);
+                        }
                     }
-                    let Some(set) = known else { return self.below(shop, part.next, value.node, target, to) };
-                    self.step = Step::Return(set);
-                    self.resume(shop, set, watch)?;
                 }
                 event += 1;
             }
             event = 0;
             at = if at as usize + 1 == self.values.len() { base } else { at + 1 };
         }
+        self.stand_at(at, event, added); // what follows may fail
         let mut result = start;
-        if let Some(Frame::Fix { added: true, .. }) = self.frames.last() {
+        if added {
             let values = &mut self.values[base as usize..];
             values.sort_unstable_by_key(|value| value.bits);
             result = closed(&mut shop.diagram.store, values, shop.blocks.low(block), start)?;
@@ -253,5 +263,12 @@ impl Saturation {
         shop.diagram.cache.put(&shop.diagram.store.memory, self.by.ops().1, block, start, within, result)?;
         self.leave(base as usize, result);
         Ok(())
+    }
+
+    /// How far the uppermost frame, a fixed point, has come: it is gone on with from there.
+    fn stand_at(&mut self, value: u32, event: u32, added: bool) {
+        if let Some(Frame::Fix { at, event: next, added: any, .. }) = self.frames.last_mut() {
+            (*at, *next, *any) = (value, event, added);
+        }
     }
 }
