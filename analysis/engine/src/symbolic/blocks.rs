@@ -13,7 +13,7 @@
 
 use std::collections::HashMap;
 
-use super::events::{Kind, Mixed, Sense, literals};
+use super::events::{Kind, Mixed, Sense, literals_into};
 use super::zdd::{EMPTY, Node, Store};
 use crate::net::Transition;
 
@@ -37,9 +37,10 @@ impl Literals {
     /// Those of these transitions, where each place has its level.
     pub(super) fn new(transitions: &[Transition], level_of: &[u32], sense: Sense) -> Self {
         let mut found = Literals { offsets: vec![0], all: Vec::new() };
+        let mut own = Vec::new();
         for transition in transitions.iter().filter(|t| !(t.inputs.is_empty() && t.outputs.is_empty())) {
-            if let Some(own) = literals(transition, level_of, sense) {
-                found.all.extend(own);
+            if literals_into(transition, level_of, sense, &mut own) {
+                found.all.extend_from_slice(&own);
                 found.offsets.push(found.all.len() as u32);
             }
         }
@@ -77,8 +78,14 @@ impl Literals {
     }
 }
 
-/// What a transition wants and changes in a window of places, as bits.
-type Local = [u32; 3];
+/// What a transition wants and changes in a window of places: three bits for each place, the highest ones for the first. So
+/// moves in ascending order stay so when their last places are left out, and those that become equal stand side by side.
+type Local = u64;
+const PLACE_BITS: usize = 3;
+/// Of one place: it must hold a token, must hold none, changes.
+const FULL: Local = 1 << 2;
+const HOLE: Local = 1 << 1;
+const FLIP: Local = 1;
 
 /// The levels cut into blocks.
 #[derive(Debug)]
@@ -101,8 +108,9 @@ impl Blocks {
         let (mut start, mut work) = (1, 0);
         while start <= levels {
             let most = if work > WORK_MAX { 1 } else { WIDTH_MAX.min(levels + 1 - start) };
-            let mut window: Vec<Local> = Vec::new();
-            for &t in &joined[offsets[start] as usize..offsets[start + most] as usize] {
+            let its = &joined[offsets[start] as usize..offsets[start + most] as usize];
+            let mut window: Vec<Local> = Vec::with_capacity(its.len());
+            for &t in its {
                 if std::mem::replace(&mut seen[t as usize], start as u32) != start as u32 {
                     window.push(local(literals.get(t as usize), start as u32, most as u32));
                 }
@@ -157,29 +165,43 @@ impl Blocks {
     }
 }
 
-fn local(literals: &[(u32, Kind)], start: u32, width: u32) -> Local {
-    let mut found = [0; 3];
-    for &(level, kind) in literals.iter().filter(|(level, _)| (start..start + width).contains(level)) {
-        let bit = 1 << (level - start);
-        found[usize::from(!kind.wants())] |= bit;
-        if kind.wants() != kind.leaves() {
-            found[2] |= bit;
-        }
-    }
-    found
+/// How far the bits of a place of a window are shifted.
+fn shift(place: usize) -> usize {
+    PLACE_BITS * (WIDTH_MAX - 1 - place)
 }
 
-/// How many places from the first of a window make the best block; `known` is a set of values that is empty.
+fn local(literals: &[(u32, Kind)], start: u32, width: u32) -> Local {
+    let within = literals.iter().filter(|(level, _)| (start..start + width).contains(level));
+    within.fold(0, |found, &(level, kind)| {
+        let wants = if kind.wants() { FULL } else { HOLE };
+        let own = if kind.wants() == kind.leaves() { wants } else { wants | FLIP };
+        found | own << shift((level - start) as usize)
+    })
+}
+
+/// The same as bits of a value, one for each place: those that matter, those of them that must hold a token, and those that
+/// change.
+fn masks(local: Local) -> [u32; 3] {
+    [FULL | HOLE, FULL, FLIP].map(|kind| {
+        let bit = |place: usize| u32::from(local >> shift(place) & kind != 0) << place;
+        (0..WIDTH_MAX).fold(0, |mask, place| mask | bit(place))
+    })
+}
+
+/// How many places from the first of a window make the best block; the moves are in order, and `known` is a set of values
+/// that is empty.
 fn width(first: u32, window: &[Local], most: usize, known: &mut [u64], work: &mut usize) -> usize {
     let (mut best, mut width) = (usize::MAX, 1);
-    let mut moves: Vec<Local> = Vec::with_capacity(window.len());
+    let window: Vec<(Local, [u32; 3])> = window.iter().map(|&local| (local, masks(local))).collect();
+    let mut moves: Vec<[u32; 3]> = Vec::with_capacity(window.len());
     let mut values: Vec<u32> = Vec::with_capacity(VALUES_MAX + window.len());
     for places in 1..=most {
         let mask = u32::MAX >> (32 - places);
+        let cut = |&(local, _): &(Local, [u32; 3])| local >> shift(places - 1);
+        let different =
+            window.chunk_by(|one, other| cut(one) == cut(other)).map(|all| all[0].1.map(|bits| bits & mask));
         moves.clear();
-        moves.extend(window.iter().map(|local| local.map(|bits| bits & mask)).filter(|local| local[2] != 0));
-        moves.sort_unstable();
-        moves.dedup();
+        moves.extend(different.filter(|[_, _, flip]| *flip != 0));
         *work += window.len();
         let mut found = |value: u32, values: &mut Vec<u32>| {
             let (word, bit) = (value as usize / 64, 1 << (value % 64));
@@ -194,8 +216,8 @@ fn width(first: u32, window: &[Local], most: usize, known: &mut [u64], work: &mu
             let value = values[at];
             at += 1;
             *work += moves.len();
-            for [full, empty, flip] in &moves {
-                if value & full == *full && value & empty == 0 {
+            for [matter, full, flip] in &moves {
+                if value & matter == *full {
                     found(value ^ flip, &mut values);
                 }
             }

@@ -163,10 +163,21 @@ pub enum Sense {
 ///
 /// `level_of` gives each place its level.
 pub fn literals(transition: &Transition, level_of: &[u32], sense: Sense) -> Option<Vec<(u32, Kind)>> {
+    let mut all = Vec::new();
+    literals_into(transition, level_of, sense, &mut all).then_some(all)
+}
+
+/// The same in place of what is in a list; whether it can fire.
+pub(super) fn literals_into(
+    transition: &Transition,
+    level_of: &[u32],
+    sense: Sense,
+    all: &mut Vec<(u32, Kind)>,
+) -> bool {
+    all.clear();
     if !transition.openable() {
-        return None;
+        return false;
     }
-    let mut all: Vec<(u32, Kind)> = Vec::new();
     let lists = [
         (&transition.inputs, Kind::Take),
         (&transition.outputs, Kind::Put),
@@ -179,17 +190,17 @@ pub fn literals(transition: &Transition, level_of: &[u32], sense: Sense) -> Opti
     // Stable: of two literals on one place the arc comes before the gate, and the gate must agree with it.
     all.sort_by_key(|&(level, _)| std::cmp::Reverse(level));
     if all.windows(2).any(|pair| pair[0].0 == pair[1].0 && pair[0].1.wants() != pair[1].1.wants()) {
-        return None;
+        return false;
     }
     all.dedup_by_key(|&mut (level, _)| level);
-    for (_, kind) in &mut all {
+    for (_, kind) in all {
         *kind = match sense {
             Sense::Forward => *kind,
             Sense::Backward => kind.reversed(),
             Sense::Test => kind.tested(),
         };
     }
-    Some(all)
+    true
 }
 
 /// The literals of contact at a transition because of one full output, in descending order; None where it cannot be.

@@ -119,17 +119,18 @@ impl Agenda {
     pub(super) fn new(parts: &mut Parts, literals: &Literals, blocks: &Blocks) -> Result<Self, Stop> {
         let mut heads = Vec::with_capacity(literals.len());
         for at in 0..literals.len() {
-            heads.push(parts.whole(literals.get(at), blocks)?);
+            let head = parts.whole(literals.get(at), blocks)?;
+            let Part { block, next, .. } = *parts.get(head);
+            heads.push((block, next, head));
         }
         parts.index = HashMap::default();
-        heads.retain(|&head| head != DONE);
+        heads.retain(|&(.., head)| head != DONE);
+        // Of the same block, those that end in it first: they are cheap and enlarge what the others see.
         heads.sort_unstable();
         heads.dedup();
-        // Of the same block, those that end in it first: they are cheap and enlarge what the others see.
-        heads.sort_by_key(|&head| (parts.get(head).block, parts.get(head).next != DONE, parts.get(head).next, head));
         let mut offsets = vec![0; blocks.len() + 2];
         let mut needs = vec![u32::MAX; blocks.len() + 1];
-        let events: Vec<Part> = heads.into_iter().map(|head| *parts.get(head)).collect();
+        let events: Vec<Part> = heads.into_iter().map(|(.., head)| *parts.get(head)).collect();
         for event in &events {
             offsets[event.block as usize + 1] += 1;
             if event.full == 0 {
