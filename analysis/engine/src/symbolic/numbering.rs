@@ -31,10 +31,9 @@ impl Graph {
     /// One of two vertices of a component that are far from each other, and all of the component; leaves the distances
     /// from the other one.
     fn end_of(&self, from: u32, distance: &mut [u32]) -> (u32, Vec<u32>) {
-        let mut start = from;
-        let mut far = 0;
+        let (mut start, mut far) = (from, 0);
+        let mut found = self.by_distance(start, distance);
         for _ in 0..4 {
-            let found = self.by_distance(start, distance);
             let last = found[found.len() - 1];
             let reach = distance[last as usize];
             let end = found
@@ -44,14 +43,13 @@ impl Graph {
                 .copied()
                 .min_by_key(|&vertex| self.degree(vertex))
                 .unwrap_or(last);
-            found.iter().for_each(|&vertex| distance[vertex as usize] = u32::MAX);
             if reach <= far && far > 0 {
                 break;
             }
-            far = reach;
-            start = end;
+            found.iter().for_each(|&vertex| distance[vertex as usize] = u32::MAX);
+            (start, far) = (end, reach);
+            found = self.by_distance(start, distance);
         }
-        let found = self.by_distance(start, distance);
         let end = found[found.len() - 1];
         found.iter().for_each(|&vertex| distance[vertex as usize] = u32::MAX);
         (start, self.by_distance(end, distance))
@@ -62,8 +60,8 @@ impl Graph {
     }
 
     pub(super) fn sloan(&self) -> Order {
-        const DEGREE: i64 = 2;
-        const DISTANCE: i64 = 1;
+        const DEGREE: i32 = 2;
+        const DISTANCE: i32 = 1;
         #[derive(Clone, Copy, PartialEq)]
         enum Status {
             Inactive,
@@ -73,30 +71,35 @@ impl Graph {
         }
         let count = self.vertices();
         let (mut distance, mut status) = (vec![u32::MAX; count], vec![Status::Inactive; count]);
-        let mut priority = vec![0_i64; count];
+        // What each vertex has, and what it has in the queue.
+        let mut priority = vec![(0_i32, i32::MIN); count];
         let mut numbered = Vec::with_capacity(count);
-        let mut queue: BinaryHeap<(i64, std::cmp::Reverse<u32>)> = BinaryHeap::new();
+        // Those of the greatest priority first, and of these the one with the least number.
+        let mut queue: BinaryHeap<i64> = BinaryHeap::new();
+        let entry = |priority: i32, vertex: u32| i64::from(priority) << 32 | i64::from(!vertex);
+        let mut raised = Vec::new();
         for seed in 0..self.places as u32 {
             if status[seed as usize] != Status::Inactive {
                 continue;
             }
             let (start, component) = self.end_of(seed, &mut distance);
             for &vertex in &component {
-                let far = i64::from(distance[vertex as usize]);
-                priority[vertex as usize] = DISTANCE * far - DEGREE * (self.degree(vertex) as i64 + 1);
+                let far = distance[vertex as usize] as i32;
+                priority[vertex as usize].0 = DISTANCE * far - DEGREE * (self.degree(vertex) as i32 + 1);
             }
             status[start as usize] = Status::Preactive;
-            queue.push((priority[start as usize], std::cmp::Reverse(start)));
-            while let Some((value, std::cmp::Reverse(vertex))) = queue.pop() {
-                if status[vertex as usize] == Status::Numbered || value != priority[vertex as usize] {
+            queue.push(entry(priority[start as usize].0, start));
+            while let Some(first) = queue.pop() {
+                let vertex = !(first as u32);
+                if status[vertex as usize] == Status::Numbered || first != entry(priority[vertex as usize].0, vertex) {
                     continue; // an older entry of a vertex whose priority rose
                 }
                 let mut raise = |at: u32, status: &mut [Status]| {
-                    priority[at as usize] += DEGREE;
+                    priority[at as usize].0 += DEGREE;
                     if status[at as usize] == Status::Inactive {
                         status[at as usize] = Status::Preactive;
                     }
-                    queue.push((priority[at as usize], std::cmp::Reverse(at)));
+                    raised.push(at);
                 };
                 if status[vertex as usize] == Status::Preactive {
                     for &next in self.next_to(vertex) {
@@ -116,6 +119,14 @@ impl Graph {
                                 raise(beyond, &mut status);
                             }
                         }
+                    }
+                }
+                // Most are raised several times at once.
+                for at in raised.drain(..) {
+                    let (now, queued) = &mut priority[at as usize];
+                    if now != queued {
+                        *queued = *now;
+                        queue.push(entry(*now, at));
                     }
                 }
             }

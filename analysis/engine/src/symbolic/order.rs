@@ -68,21 +68,21 @@ impl Graph {
                 .flat_map(|(t, transition)| joined(transition).map(move |place| (place as usize, places + t)))
         };
         let mut offsets = vec![0; vertices + 1];
-        for (place, t) in edges() {
+        edges().for_each(|(place, t)| {
             offsets[place + 1] += 1;
             offsets[t + 1] += 1;
-        }
+        });
         for at in 0..vertices {
             offsets[at + 1] += offsets[at];
         }
         let mut ends = vec![0; offsets[vertices] as usize];
         let mut next = offsets.clone();
-        for (place, t) in edges() {
+        edges().for_each(|(place, t)| {
             for (from, to) in [(place, t), (t, place)] {
                 ends[next[from] as usize] = to as u32;
                 next[from] += 1;
             }
-        }
+        });
         Graph { places, offsets, ends }
     }
 
@@ -100,43 +100,57 @@ impl Graph {
 
     /// The sum over the transitions of how far apart their places lie.
     fn span(&self, order: &[u32]) -> u64 {
-        let mut level = vec![0_u32; self.places];
-        order.iter().enumerate().for_each(|(at, &place)| level[place as usize] = at as u32);
-        let of = |t: usize| {
-            let levels = self.next_to(t as u32).iter().map(|&place| level[place as usize]);
-            levels.clone().max().map_or(0, |top| u64::from(top - levels.min().unwrap_or(top)))
-        };
-        (self.places..self.vertices()).map(of).sum()
+        let mut position = vec![0.0; self.vertices()];
+        order.iter().enumerate().for_each(|(at, &place)| position[place as usize] = at as f64);
+        self.pull_transitions(&mut position)
+    }
+
+    /// Moves each transition to the middle of its places; the sum over the transitions of how far apart those lie.
+    fn pull_transitions(&self, position: &mut [f64]) -> u64 {
+        let mut span = 0;
+        for t in self.places..self.vertices() {
+            let ends = self.next_to(t as u32);
+            let (mut sum, mut least, mut most) = (0.0, f64::MAX, 0.0);
+            for &place in ends {
+                let own = position[place as usize];
+                sum += own;
+                least = if own < least { own } else { least };
+                most = if own > most { own } else { most };
+            }
+            position[t] = sum / ends.len() as f64;
+            span += if ends.is_empty() { 0 } else { u64::from((most - least) as u32) };
+        }
+        span
+    }
+
+    /// The same of each place, to the middle of its transitions.
+    fn pull_places(&self, position: &mut [f64]) {
+        for place in (0..self.places).filter(|&place| self.degree(place as u32) > 0) {
+            let ends = self.next_to(place as u32);
+            position[place] = ends.iter().map(|&end| position[end as usize]).sum::<f64>() / ends.len() as f64;
+        }
     }
 
     pub(super) fn force(&self, order: Order) -> Order {
         let mut position: Vec<f64> = vec![0.0; self.vertices()];
         let rounds = (FORCE_WORK / (self.ends.len() + self.vertices() + 1)).clamp(2, FORCE_ROUNDS);
-        let (mut best_span, mut best, mut current) = (self.span(&order), order.clone(), order);
-        let mut worse = 0;
-        for _ in 0..rounds {
+        let (mut best_span, mut best, mut current) = (u64::MAX, Order::new(), order);
+        let (mut worse, mut sorted) = (0, Order::new());
+        for round in 0..=rounds {
             current.iter().enumerate().for_each(|(at, &place)| position[place as usize] = at as f64);
-            let middle = |position: &[f64], vertex: usize| {
-                let ends = self.next_to(vertex as u32);
-                ends.iter().map(|&end| position[end as usize]).sum::<f64>() / ends.len() as f64
-            };
-            for t in self.places..self.vertices() {
-                position[t] = middle(&position, t);
-            }
-            for place in (0..self.places).filter(|&place| self.degree(place as u32) > 0) {
-                position[place] = middle(&position, place);
-            }
-            current.sort_by(|&a, &b| position[a as usize].total_cmp(&position[b as usize]));
-            let span = self.span(&current);
+            let span = self.pull_transitions(&mut position); // of the order as it is
             if span < best_span {
                 (best_span, worse) = (span, 0);
                 best.clone_from(&current);
             } else {
                 worse += 1;
-                if worse == 3 {
-                    break;
-                }
             }
+            if worse == 3 || round == rounds {
+                break;
+            }
+            self.pull_places(&mut position);
+            sort_by_position(&current, &position, &mut sorted);
+            std::mem::swap(&mut current, &mut sorted);
         }
         best
     }
@@ -213,6 +227,29 @@ impl Graph {
             }
         }
         order
+    }
+}
+
+/// Puts places in the order of their positions, those at the same one as they were; positions lie within the order.
+///
+/// By their whole parts first: positions are spread over the order, so that few places have one in common.
+fn sort_by_position(order: &[u32], position: &[f64], sorted: &mut Order) {
+    let whole = |place: u32| position[place as usize] as u32 as usize;
+    let mut starts = vec![0_u32; order.len() + 1];
+    order.iter().for_each(|&place| starts[whole(place) + 1] += 1);
+    for at in 0..order.len() {
+        starts[at + 1] += starts[at];
+    }
+    sorted.resize(order.len(), 0);
+    let mut next = starts.clone();
+    for &place in order {
+        let at = &mut next[whole(place)];
+        sorted[*at as usize] = place;
+        *at += 1;
+    }
+    for range in starts.windows(2).filter(|range| range[1] - range[0] > 1) {
+        let same = &mut sorted[range[0] as usize..range[1] as usize];
+        same.sort_by(|&a, &b| position[a as usize].total_cmp(&position[b as usize]));
     }
 }
 
@@ -294,6 +331,19 @@ mod tests {
     use super::*;
     use crate::budget::unwatched;
     use crate::samples::slotted_ring;
+
+    #[test]
+    fn places_at_one_position_stay_as_they_were() {
+        let order: Order = (0..40).map(|at| at * 7 % 40).collect();
+        for spread in [0.0, 0.25, 0.9] {
+            let position: Vec<f64> = (0..40).map(|place| f64::from(place * 11 % 13) * spread + 5.5).collect();
+            let mut wanted = order.clone();
+            wanted.sort_by(|&a, &b| position[a as usize].total_cmp(&position[b as usize]));
+            let mut sorted = Order::new();
+            sort_by_position(&order, &position, &mut sorted);
+            assert_eq!(sorted, wanted);
+        }
+    }
 
     fn made(places: usize, transitions: &[Transition]) -> Vec<Order> {
         let mut poll = unwatched;
