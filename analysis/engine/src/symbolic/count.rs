@@ -34,6 +34,9 @@ const ONE: u32 = 1;
 #[derive(Default)]
 struct Sums {
     terms: Vec<[u32; 2]>,
+    /// By node, the number of its markings; `ZERO` where it is not known, as none but the empty set has no marking.
+    markings: Vec<u32>,
+    /// The other numbers.
     known: HashMap<Want, u32, Mixed>,
 }
 
@@ -45,8 +48,8 @@ impl Want {
 }
 
 impl Sums {
-    fn new() -> Self {
-        Sums { terms: vec![[ZERO; 2]; 2], known: HashMap::default() }
+    fn new(nodes: usize) -> Self {
+        Sums { terms: vec![[ZERO; 2]; 2], markings: vec![ZERO; nodes], known: HashMap::default() }
     }
 
     fn add(&mut self, a: u32, b: u32) -> u32 {
@@ -74,7 +77,7 @@ impl Sums {
     }
 
     fn bytes(&self) -> usize {
-        self.terms.capacity() * 8 + self.known.capacity() * 24
+        self.terms.capacity() * 8 + self.markings.capacity() * 4 + self.known.capacity() * 24
     }
 
     /// The value of a number; `memory` is asked for what the large ones take.
@@ -163,7 +166,7 @@ fn add(sum: &mut Natural, short: &[u64]) -> usize {
 
 /// How many markings a set holds.
 pub fn markings(diagram: &Diagram, set: Node, watch: &mut Watch<'_>) -> Result<Natural, Stop> {
-    let mut counting = Counting { diagram, suffixes: None, table: None, sums: Sums::new() };
+    let mut counting = Counting { diagram, suffixes: None, table: None, sums: Sums::new(diagram.store.len()) };
     counting.value(Want::Markings(set), watch)
 }
 
@@ -177,14 +180,15 @@ pub fn firable(
     set: Node,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<Natural>, Stop> {
-    let mut counting = Counting { diagram, suffixes: Some(suffixes), table: None, sums: Sums::new() };
+    let mut counting =
+        Counting { diagram, suffixes: Some(suffixes), table: None, sums: Sums::new(diagram.store.len()) };
     counting.find(Want::Markings(set), watch)?;
     let kept = counting.sums.terms.len();
     let mut counts = Vec::with_capacity(events.len());
     for &event in events {
         counts.push(counting.value(Want::firable(event, set), watch)?);
         counting.sums.terms.truncate(kept);
-        counting.sums.known.retain(|want, _| matches!(want, Want::Markings(_)));
+        counting.sums.known.clear();
     }
     Ok(counts)
 }
@@ -198,7 +202,8 @@ pub fn edges(
     levels: u32,
     watch: &mut Watch<'_>,
 ) -> Result<Natural, Stop> {
-    let mut counting = Counting { diagram, suffixes: Some(suffixes), table: Some(table), sums: Sums::new() };
+    let mut counting =
+        Counting { diagram, suffixes: Some(suffixes), table: Some(table), sums: Sums::new(diagram.store.len()) };
     counting.find(Want::Edges(set), watch)?;
     counting.find(Want::Markings(set), watch)?;
     let mut wanted = Vec::new();
@@ -242,6 +247,7 @@ impl Counting<'_> {
             Want::Markings(EMPTY) | Want::Firable(_, EMPTY) | Want::Edges(EMPTY | UNIT) => Some(ZERO),
             Want::Markings(UNIT) => Some(ONE),
             Want::Firable(suffix, node) if self.needs(suffix) > self.diagram.store.level(node) => Some(ZERO),
+            Want::Markings(node) => Some(self.sums.markings[node as usize]).filter(|&number| number != ZERO),
             want => self.sums.known.get(&want).copied(),
         }
     }
@@ -322,7 +328,10 @@ impl Counting<'_> {
             todo.extend(parts.iter().copied().filter(|&part| self.known(part).is_none()));
             if todo.len() == before {
                 let number = self.sum(&parts);
-                self.sums.known.insert(want, number);
+                match want {
+                    Want::Markings(node) => self.sums.markings[node as usize] = number,
+                    _ => _ = self.sums.known.insert(want, number),
+                }
                 todo.pop();
             }
         }
@@ -354,7 +363,7 @@ mod tests {
     #[test]
     fn numbers_without_limit_are_powers_of_two_where_each_is_doubled() {
         // 2^n by doubling, and 2^n - 1 by adding up all smaller powers, each of which is needed twice.
-        let mut sums = Sums::new();
+        let mut sums = Sums::new(0);
         let (mut power, mut all) = (ONE, ONE);
         for _ in 0..300 {
             power = sums.add(power, power);
