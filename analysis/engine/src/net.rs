@@ -35,13 +35,13 @@ impl Transition {
         inhibitive: &[u32],
         literals: &[(u32, bool)],
     ) -> Self {
-        Transition {
-            inputs: set(inputs),
-            outputs: set(outputs),
-            permissive: set(permissive),
-            inhibitive: set(inhibitive),
-            literals: set(literals),
-        }
+        Self::of([inputs, outputs, permissive, inhibitive].map(<[u32]>::to_vec), literals.to_vec())
+    }
+
+    /// The same of lists that it keeps: inputs, outputs, permissive and inhibitive gates, and literals.
+    pub(crate) fn of(places: [Vec<u32>; 4], literals: Vec<(u32, bool)>) -> Self {
+        let [inputs, outputs, permissive, inhibitive] = places.map(set);
+        Transition { inputs, outputs, permissive, inhibitive, literals: set(literals) }
     }
 
     /// Whether some valuation of the signals makes every literal true.
@@ -55,8 +55,7 @@ impl Transition {
     }
 }
 
-fn set<T: Copy + Ord>(items: &[T]) -> Vec<T> {
-    let mut items = items.to_vec();
+fn set<T: Ord>(mut items: Vec<T>) -> Vec<T> {
     items.sort_unstable();
     items.dedup();
     items
@@ -228,13 +227,13 @@ impl Net {
             }
             let self_loop = meet(inputs, outputs);
             let openable = transition.openable();
-            let full = set(&[inputs.as_slice(), permissive].concat());
+            let full = set([inputs.as_slice(), permissive].concat());
             net.forward.add(&full, inhibitive, &minus(outputs, inputs), !self_loop, openable);
             // A gate that Eq. (1) can never meet: the marking before would need a place full and empty.
             let never = meet(permissive, outputs) || meet(inhibitive, inputs) || meet(permissive, inhibitive);
             net.backward.add(
-                &set(&[outputs.as_slice(), &minus(permissive, inputs)].concat()),
-                &set(&[inputs.as_slice(), &minus(inhibitive, outputs)].concat()),
+                &set([outputs.as_slice(), &minus(permissive, inputs)].concat()),
+                &set([inputs.as_slice(), &minus(inhibitive, outputs)].concat()),
                 &[],
                 !self_loop && !never,
                 openable,

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
-use pyo3::types::{PyBytes, PyTuple};
+use pyo3::types::{PyBytes, PyDict, PyTuple};
 
 use crate::net::{Net, Transition};
 use crate::symbolic::events::Mixed;
@@ -35,7 +35,7 @@ impl Rows {
         let flat = match self {
             // Each row is freed as it is read: half a million of them take as much as a diagram.
             Rows::Listed(rows) => {
-                return Ok(rows.into_iter().map(|(i, o, p, h, x)| Transition::new(&i, &o, &p, &h, &x)).collect());
+                return Ok(rows.into_iter().map(|(i, o, p, h, x)| Transition::of([i, o, p, h], x)).collect());
             }
             Rows::Flat(flat) => flat,
         };
@@ -55,8 +55,7 @@ impl Rows {
                 *set = of.next(t)?;
             }
             let literals: Vec<(u32, bool)> = literals.next(t)?.iter().map(|&x| (x >> 1, x & 1 != 0)).collect();
-            let [inputs, outputs, permissive, inhibitive] = &sets;
-            transitions.push(Transition::new(inputs, outputs, permissive, inhibitive, &literals));
+            transitions.push(Transition::of(sets, literals));
         }
         if places.iter().chain([&literals]).any(|sets| !sets.left.is_empty()) {
             return Err("the parts are longer than their transitions".to_owned());
@@ -105,8 +104,8 @@ fn tuple_of<'py>(object: Bound<'py, PyAny>) -> PyResult<Bound<'py, PyTuple>> {
 /// The transitions of a net, flat, read off its objects. See the stub.
 ///
 /// A net has one string for each of its names, whoever it joins, so an index is known by where the string is: to look
-/// into the string, the dictionary and the number takes several times as long. Each object is visited once, for most of
-/// the time goes by in waiting for memory.
+/// into the string, the dictionary and the number takes several times as long. Each object is visited once, and the
+/// dictionary from its first entry to its last, for most of the time goes by in waiting for memory.
 #[pyfunction]
 pub(crate) fn flat<'py>(
     places: &Bound<'py, PyAny>,
@@ -116,6 +115,11 @@ pub(crate) fn flat<'py>(
     let py = places.py();
     let parts = [intern!(py, "inputs"), intern!(py, "outputs"), intern!(py, "permissive"), intern!(py, "inhibitive")];
     let mut known: HashMap<usize, u32, Mixed> = HashMap::with_capacity_and_hasher(places.len()?, Mixed::default());
+    if let Ok(places) = places.cast::<PyDict>() {
+        for (name, number) in places {
+            known.insert(name.as_ptr() as usize, number.extract()?);
+        }
+    }
     // A string that is known by where it is must not make room for another one; nor does anybody else run meanwhile.
     let mut held = Vec::new();
     let mut found: [(Vec<u8>, Vec<u8>); 5] = Default::default();
