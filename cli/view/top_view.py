@@ -3,7 +3,7 @@
 The plant file has no positions, so this is a sketch, arranged as a cell is sketched on paper: the stations in the order
 of the file from left to right, a belt between the two ends of what carries between two stations, a table where a
 machine works, set back from the line, and an arm before the stations that it reaches. Arms that reach the same stations
-stand on both sides of the line. A machine that only works, at no station that the file names, stands behind the line.
+stand on both sides of the line. A machine that only works, at no station that the file names, stands behind them all.
 
 A machine that carries between several stations is an arm whose gripper is a station of its own: what it alone fills and
 empties. Units are those of the drawing; the line is y = 0, and what is in front of it has y > 0.
@@ -37,7 +37,8 @@ def top_view(plant: PlantModel) -> dict[str, Any]:
     rest = [name for name in plant.machines if name not in {*belts, *tables, *arms}]
     middle = sum(x for x, _ in stations.values()) / max(1, len(stations))
     left = middle - (len(rest) - 1) * GAP / 2
-    others = {name: [left + i * GAP, BACK * 2.2] for i, name in enumerate(rest)}
+    behind = min([BACK * 2.2, *(arm["home"][1] - SIDE for arm in arms.values())])
+    others = {name: [left + i * GAP, behind] for i, name in enumerate(rest)}
     return {
         "name": plant.plant,
         "says": plant.description,

@@ -180,3 +180,22 @@ machines: {M: {commands: {GO: {does: work, takes_s: 1}}}}
     view = top_view(parse_plant(text))
     assert view["stations"] == {"s": [0.0, -95.0]}
     assert set(view["others"]) == {"M"}
+
+
+def test_a_machine_that_only_works_stands_behind_the_arms_behind_the_line() -> None:
+    text = """firable_plant: 1
+plant: p
+stations: [a, b]
+arrivals: {station: a, every_s: 1}
+departures: {station: b}
+machines:
+  R1: {hand: H, positions: {H: , A: a, B: b}, commands: {GO: {does: move, takes_s: 1}}}
+  R2: {hand: H, positions: {H: , A: a, B: b}, commands: {GO: {does: move, takes_s: 1}}}
+  M: {commands: {GO: {does: work, takes_s: 1}}}
+"""
+    view = top_view(parse_plant(text))
+    assert view["arms"]["R2"]["base"][1] < min(y for _, y in view["stations"].values())
+    (machine,) = view["others"].values()
+    for arm in view["arms"].values():
+        for x, y in (arm["base"], arm["home"]):
+            assert max(abs(x - machine[0]), abs(y - machine[1])) >= 60
