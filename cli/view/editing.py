@@ -68,6 +68,8 @@ class Editing:
     playing: Playing
     file: NetFile | None
     why_not: str = ""
+    is_net: bool = True
+    """Whether the file as it was read last is a net; where somebody has made none of it, the one before is shown."""
     done: list[_Step] = field(default_factory=list)
     undone: list[_Step] = field(default_factory=list)
     one_at_a_time: asyncio.Lock = field(default_factory=asyncio.Lock)
@@ -90,25 +92,21 @@ class Editing:
         """The text, and what the page lists of it."""
         if self.file is None:
             return {"why_not": self.why_not}
-        text = YamlText(self.file.source)
-        arcs = {
-            name: {part: edits.names_in(text.at(("transitions", name, part))) for part in edits.PARTS}
-            for name in text.at(("transitions",)) or {}
-        }
         return {
             "text": self.file.source.text,
             "version": self.file.version,
+            "is_net": self.is_net,
             "shown": self.playing.shown,
             "undo": self.done[-1].what if self.done else None,
             "redo": self.undone[-1].what if self.undone else None,
-            "arcs": arcs,
+            "arcs": _arcs(self.file.source) if self.is_net else {},
             "marked": [place.name for place in self.playing.player.net.places if place.marked],
         }
 
     async def version(self, _: Asked) -> dict[str, Any]:
-        """Whether the file is still what is shown, and which of the nets that it was is."""
+        """Whether the file is still what was read, which of the nets that it was is shown, and whether it is one."""
         current = self.file is not None and await asyncio.to_thread(self.file.is_current)
-        return {"current": current, "shown": self.playing.shown}
+        return {"current": current, "shown": self.playing.shown, "is_net": self.is_net}
 
     async def edit(self, asked: Asked) -> dict[str, Any]:
         """One edit of the net."""
@@ -156,6 +154,7 @@ class Editing:
             try:
                 loaded = await asyncio.to_thread(_read, file.source)
             except InputError as error:
+                self.is_net = False
                 return _draft(error, file.source.text, version=file.version)
             self._take(loaded, is_another=not is_known or loaded.net != self.playing.loaded.net)
             return await self._shown()
@@ -213,6 +212,7 @@ class Editing:
 
         A layout file that cannot be read, or written, is left as it is: the net is what is edited, and it is written.
         """
+        self.is_net = True
         path, look = layout_path(self._file().path), self.playing.pictures.look
         given = look.given
         with suppress(InputError):
@@ -254,6 +254,15 @@ def _read(source: Source) -> Loaded:
         message = f"{count:,} places and transitions make no picture that anybody can read"
         raise InputError([Diagnostic("F1020", message, f"edit a net of more than {NODES_MAX:,} in an editor of text")])
     return Loaded(net, positions=positions)
+
+
+def _arcs(source: Source) -> dict[str, dict[str, list[str]]]:
+    """The arcs and gates of each transition of a text."""
+    text = YamlText(source)
+    return {
+        name: {part: edits.names_in(text.at(("transitions", name, part))) for part in edits.PARTS}
+        for name in text.at(("transitions",)) or {}
+    }
 
 
 def _draft(error: InputError, text: str, version: str | None = None) -> dict[str, Any]:

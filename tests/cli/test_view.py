@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import re
@@ -17,6 +18,7 @@ from support.browser import PATIENCE_MS, browser, command, done, needs_browser, 
 
 from firable.cli.main import main
 from firable.cli.view.moment import Moment, fired, told
+from firable.executor.drivers.far_side.ports import free_port
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.net import Net, Place, Transition
 from firable.semantics.player import Player
@@ -252,6 +254,17 @@ def test_the_top_view_shows_workpieces_where_commands_take_them(chromium: Browse
 
 
 @needs_browser
+def test_what_is_of_the_picture_of_the_net_is_offered_beside_it_alone(chromium: Browser, late: str) -> None:
+    with page_at(chromium, late) as page:
+        of_the_net = page.get_by_role("group", name="How the picture is shown")
+        expect(of_the_net).to_be_visible()
+        page.get_by_role("tab", name="Top view").click()
+        expect(of_the_net).to_be_hidden()
+        page.get_by_role("tab", name="The net").click()
+        expect(of_the_net).to_be_visible()
+
+
+@needs_browser
 def test_all_is_done_by_the_keyboard_alone(chromium: Browser, late: str) -> None:
     with page_at(chromium, late) as page:
         page.get_by_role("switch", name="Gates free").focus()
@@ -304,10 +317,26 @@ def test_a_lost_connection_is_shown(chromium: Browser) -> None:
 
 
 @needs_browser
+def test_a_command_that_was_started_anew_is_told_to_the_windows_of_the_one_before(chromium: Browser) -> None:
+    serve = ("view", "catalogue:one_robot", "--no-browser", "--port", str(free_port()))
+    with contextlib.ExitStack() as stack:
+        with command(*serve) as (address, _):
+            page = stack.enter_context(page_at(chromium, address))
+            expect(page.locator("h1")).to_have_text("one-robot")
+        with command(*serve):
+            page.get_by_role("switch", name="Gates free").click()
+            expect(page.get_by_role("alert")).to_contain_text("open the address that it has printed")
+
+
+@needs_browser
 def test_who_has_no_token_is_asked_for_it(chromium: Browser, late: str) -> None:
     base, _, token = late.partition("#token=")
     with page_at(chromium, base) as page:
         expect(page.locator("h1")).to_have_text("Who are you?")
+        expect(page.get_by_role("alert")).to_have_count(0)
+        page.get_by_label("Token").fill("another")
+        page.keyboard.press("Enter")
+        expect(page.get_by_role("alert")).to_contain_text("is not that of the command that runs now")
         page.get_by_label("Token").fill(token)
         page.keyboard.press("Enter")
         expect(page.locator("h1")).to_have_text("one-robot-mc-late")

@@ -259,6 +259,63 @@ def test_an_edit_in_another_window_is_told_and_can_be_undone_in_both(
         assert file.read_text() == TEXT
 
 
+@needs_browser
+def test_a_file_of_which_somebody_else_has_made_no_net_is_not_played_as_if_it_were_shown(
+    chromium: Browser, served: tuple[str, Path], file: Path
+) -> None:
+    broken = TEXT.replace("to: robot.busy}", "to: robot.bussy}")
+    with page_at(chromium, served[0]) as page:
+        begin(page)
+        file.write_text(broken)
+        page.get_by_role("button", name="Load it again").click()
+        expect(page.get_by_role("alert")).to_have_text(
+            "The file is no net: there is no place 'robot.bussy'. Mend it in the text below."
+        )
+        expect(page.locator(".text-pane summary")).to_have_text("Text of the file no net: 1 problem")
+        expect(page.get_by_role("button", name="Discard")).to_be_disabled()
+        page.get_by_role("button", name="← Play").click()
+        expect(page.locator(".banner")).to_contain_text("The file is no net as it stands on the disk.")
+        page.get_by_role("button", name="Edit", exact=True).click()
+        expect(page.get_by_role("alert")).to_contain_text("The file is no net: there is no place 'robot.bussy'.")
+        text = page.get_by_label("Text of the net file")
+        expect(text).to_have_value(broken)
+        text.fill(TEXT)
+        page.keyboard.press("Control+s")
+        done(page, "the text")
+        assert file.read_text() == TEXT
+
+
+@needs_browser
+@pytest.mark.parametrize("where", ["Play", "Edit"])
+def test_a_file_that_is_gone_is_named(chromium: Browser, served: tuple[str, Path], file: Path, where: str) -> None:
+    with page_at(chromium, served[0]) as page:
+        if where == "Edit":
+            begin(page)
+        file.unlink()
+        page.get_by_role("button", name="Load it again").click()
+        expect(page.get_by_role("alert")).to_contain_text(f"{file}: cannot be read: No such file or directory")
+
+
+@needs_browser
+def test_what_is_chosen_by_its_name_is_brought_into_sight(chromium: Browser, tmp_path: Path) -> None:
+    path = tmp_path / "cell.firable.yaml"
+    path.write_text(catalogue_path("one_robot").read_text())
+    small = {"width": 1000, "height": 500}
+    with (
+        command("view", path, "--no-browser") as (address, _),
+        page_at(chromium, address, viewport=small) as page,
+    ):
+        page.get_by_role("button", name="Edit", exact=True).click()
+        for kind, name, part in (("place", "conveyor.cv2_run", "circle.place"), ("transition", "G1", "rect.hit")):
+            shape = page.locator(f'[id="{kind}:{name}"] {part}').first
+            expect(shape).to_be_attached()
+            page.get_by_label("Chosen").select_option(f"{kind}:{name}")
+            room, seen = page.locator(".picture").bounding_box(), shape.bounding_box()
+            assert room is not None
+            assert seen is not None
+            assert room["y"] <= seen["y"] <= room["y"] + room["height"] - seen["height"]
+
+
 def test_to_load_a_file_again_that_nobody_has_changed_changes_nothing(served: tuple[str, Path], file: Path) -> None:
     address = served[0]
     added = {"do": "add", "kind": "transition", "name": "more", "version": asked(address, "")[1]["version"]}

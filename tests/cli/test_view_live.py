@@ -243,6 +243,28 @@ def test_of_many_machines_those_in_view_have_bars_and_of_many_firings_no_token_f
 
 
 @needs_browser
+@pytest.mark.parametrize("columns", [("robot", "mc"), ("infeed_conveyor", "stacking_robot", "rework_robot", "door")])
+def test_the_votes_of_controllers_fit_their_panel_whatever_their_names(
+    chromium: Browser, columns: tuple[str, ...]
+) -> None:
+    parts = [{"controller": name, "vote": "ready"} for name in columns]
+    row = {"name": "takes_crate", "says": "", "round": "", "parts": parts}
+    with command("view", "catalogue:one_robot", "--no-browser") as (address, _), page_at(chromium, address) as page:
+        for path, answer in answers(["M"], [], votes=[row]).items():
+            page.route(f"**/api/{path}", partial(fulfilled, json.dumps(answer) + "\n"))
+        page.reload()
+        votes = page.locator(".votes")
+        expect(votes.locator("tbody tr")).to_have_count(1)
+        for name in columns:
+            expect(votes).to_contain_text(name)
+        expect(votes.locator("thead th")).to_have_text(["", *columns] if len(columns) == 2 else ["", "controllers"])
+        room, seen = page.locator("aside").bounding_box(), votes.bounding_box()
+        assert room is not None
+        assert seen is not None
+        assert seen["x"] + seen["width"] <= room["x"] + room["width"]
+
+
+@needs_browser
 def test_what_stands_on_a_bar_that_began_a_minute_ago_is_seen_whole(chromium: Browser) -> None:
     long = {"number": 0, "machine": "M", "command": "M MILL", "from": 11.0, "to": 60.0, "end": "done"}
     short = {"number": 1, "machine": "M", "command": "M GO", "from": 61.0, "to": 69.0, "end": "done"}

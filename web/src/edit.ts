@@ -5,7 +5,7 @@ import { announce, h } from "./dom";
 import { Drawing } from "./drawing";
 import { Details, type Chosen, type Doing } from "./edit_details";
 import { banner, frame, panel, watchFile, type Frame } from "./frame";
-import { ask, Refused, type Edited, type EditState, type PlayPage, type Problem } from "./server";
+import { ask, Refused, type Draft, type Edited, type EditState, type PlayPage, type Problem } from "./server";
 import { TextPane } from "./text_pane";
 
 type Tool = "choose" | "arc" | "if" | "unless";
@@ -59,15 +59,17 @@ export class Edit {
     this.frame.below.append(this.pane.element);
     addEventListener("keydown", (event) => this.key(event), { signal: this.frame.gone });
     addEventListener("beforeunload", (event) => this.pane.dirty && event.preventDefault(), { signal: this.frame.gone });
-    watchFile(this.frame, () => this.shown, () => this.reload());
+    watchFile(this.frame, () => this.shown, () => this.state.is_net, () => this.reload());
     this.show();
   }
 
-  /** A text that is no net: it is shown with what is wrong, and not written. */
-  refuse(problems: Problem[], draft: string, sent: string | null = null): void {
+  /** A text that is no net: it is shown with what is wrong, and not written; where it is the file itself, it is said so. */
+  refuse({ errors: problems, draft, version }: Draft, sent: string | null = null): void {
     const words = problems.length === 1 ? problems[0]!.message : `${problems[0]?.message ?? ""}, and ${problems.length - 1} more`;
-    banner(this.frame.banner, "bad", `This is no net, and nothing is written: ${words}. Mend it in the text below, or discard it.`);
-    this.pane.refuse(problems, draft, sent);
+    const isFile = version !== null;
+    if (isFile) this.state = { ...this.state, version, is_net: false };
+    banner(this.frame.banner, "bad", isFile ? `The file is no net: ${words}. Mend it in the text below.` : `This is no net, and nothing is written: ${words}. Mend it in the text below, or discard it.`);
+    this.pane.refuse(problems, draft, sent, isFile);
   }
 
   /** The net that is shown; while an edit is on its way none, for the server may have another already. */
@@ -101,12 +103,9 @@ export class Edit {
       try {
         const answer = await ask<Edited>(path, { version: this.state.version, ...body, then: undefined });
         if ("page" in answer) this.takeOver(answer, then, sent);
-        else {
-          if (answer.version !== null) this.state = { ...this.state, version: answer.version };
-          this.refuse(answer.errors, answer.draft, sent);
-        }
+        else this.refuse(answer, sent);
       } catch (error) {
-        this.fail(error);
+        this.fail(error, path === "api/edit/reload" ? `${this.page.file}: ` : "");
       } finally {
         this.asking = false;
         this.pane.hold(false);
@@ -115,7 +114,8 @@ export class Edit {
     return this.queue;
   }
 
-  private fail(error: unknown): void {
+  /** `of` names the file that could not be read. */
+  private fail(error: unknown, of: string): void {
     if (!(error instanceof Refused)) {
       banner(this.frame.banner, "bad", "The connection is lost: is `firable view` still running?");
       return;
@@ -123,7 +123,7 @@ export class Edit {
     const again = h("button", { type: "button", class: "reload", click: () => this.reload() }, "Load it again");
     const stale = error.problems.some((one) => one.code === "F1019");
     const words = error.problems.map((one) => `${one.message}${one.hint ? ` (${one.hint})` : ""}`).join("; ") || error.message;
-    banner(this.frame.banner, "bad", `${words}.`, ...(stale ? [again] : []));
+    banner(this.frame.banner, "bad", `${of}${words}.`, ...(stale ? [again] : []));
     this.show();
   }
 

@@ -22,7 +22,7 @@ export interface Frame {
 let shown = new AbortController();
 
 /** The net and the cell from above, as two tabs of one place. */
-function tabs(picture: Picture, top: TopView): HTMLElement {
+function tabs(picture: Picture, top: TopView, zoom: HTMLElement): HTMLElement {
   const panels = [picture.element, top.element];
   const made = [["net", "The net"], ["top", "Top view"]].map(([id, words], i) =>
     h("button", { type: "button", role: "tab", id: `tab-${id}`, "aria-controls": id!, "aria-selected": String(i === 0), tabindex: i === 0 ? 0 : -1, click: () => choose(i) }, words!));
@@ -32,6 +32,7 @@ function tabs(picture: Picture, top: TopView): HTMLElement {
       one.tabIndex = i === chosen ? 0 : -1;
       panels[i]!.hidden = i !== chosen;
     });
+    zoom.hidden = chosen !== 0; // which is of the picture of the net
     made[chosen]!.focus();
     if (chosen === 0) picture.fit();
   };
@@ -75,7 +76,7 @@ export function frame(title: string, says: string, kind: string, drawing: Drawin
     h(
       "main",
       {},
-      h("section", { class: "stage", "aria-label": "The cell" }, h("div", { class: "bar-above" }, tools, top ? tabs(picture, top) : null, zoom), picture.element, top?.element, hint, below),
+      h("section", { class: "stage", "aria-label": "The cell" }, h("div", { class: "bar-above" }, tools, top ? tabs(picture, top, zoom) : null, zoom), picture.element, top?.element, hint, below),
       side,
     ),
     h("p", { id: "said", class: "unseen", role: "status", "aria-live": "polite" }),
@@ -93,14 +94,15 @@ export function frame(title: string, says: string, kind: string, drawing: Drawin
 }
 
 /** Look every two seconds whether the file, and the net that the server has of it, are still what is shown; say where not. */
-export function watchFile(where: Frame, shown: () => number, reload: () => void): void {
+export function watchFile(where: Frame, shown: () => number, isNet: () => boolean, reload: () => void): void {
   const timer = setInterval(() => {
     if (document.hidden || where.banner.querySelector(".reload") !== null) return;
     const before = shown();
-    ask<{ current: boolean; shown: number }>("api/edit/version").then((now) => {
+    ask<{ current: boolean; shown: number; is_net: boolean }>("api/edit/version").then((now) => {
       // While this window waits for an edit of its own, the server may have it already.
-      if ((now.current && now.shown === before) || before !== shown() || where.gone.aborted) return;
-      const words = now.current ? "The net has been edited in another window." : "The file has been changed on the disk.";
+      if ((now.current && now.shown === before && now.is_net === isNet()) || before !== shown() || where.gone.aborted) return;
+      const edited = now.is_net ? "The net has been edited in another window." : "The file is no net as it stands on the disk.";
+      const words = now.current ? edited : "The file has been changed on the disk.";
       banner(where.banner, "open", words, h("button", { type: "button", class: "reload", click: reload }, "Load it again"));
     }, () => undefined); // that nobody answers is told by what one does
   }, 2000);

@@ -70,6 +70,7 @@ export class Live {
   private readonly votes = h("table", { class: "votes" });
   private readonly rows = new Map<string, Votes>();
   private readonly shownRows = new Map<string, HTMLElement>();
+  private isWide = false;
   private readonly changedRows = new Set<string>();
   private readonly drawVotes = paced(() => this.showVotes());
   private readonly untold: Now["events"] = [];
@@ -271,11 +272,12 @@ export class Live {
     }
   }
 
-  /** The rows that have changed; of many controllers a row names those that take part, instead of a column for each. */
+  /** The rows that have changed; of many controllers, or long names, a row names those that take part, instead of a column for each. */
   private showVotes(): void {
     const controllers = [...new Set([...this.rows.values()].flatMap((row) => row.parts.map((part) => part.controller)))];
-    const wide = controllers.length > COLUMNS_MAX;
-    if (this.shownRows.size !== this.rows.size) {
+    const wide = (this.isWide ||= controllers.length > COLUMNS_MAX);
+    const isNew = this.shownRows.size !== this.rows.size;
+    if (isNew) {
       this.shownRows.clear();
       for (const name of this.rows.keys()) this.shownRows.set(name, h("tr", {}));
       const heads = wide ? [h("th", { scope: "col" }, "controllers")] : controllers.map((name) => h("th", { scope: "col" }, name));
@@ -297,11 +299,15 @@ export class Live {
       const all = row.parts.every((part) => ["ready", "yes", "promised", "applied", "ordered"].includes(part.vote));
       shown.className = row.round || (all ? "all" : "");
       const cells = wide
-        ? [h("td", {}, ...row.parts.flatMap((part) => [h("span", {}, ` ${part.controller} `), marked(part.vote)]))]
+        ? [h("td", { class: "parts" }, ...row.parts.flatMap((part) => [h("span", {}, ` ${part.controller} `), marked(part.vote)]))]
         : controllers.map((one) => h("td", {}, of.has(one) ? marked(of.get(one)!) : null));
       shown.replaceChildren(h("th", { scope: "row", title: row.says }, row.name, row.round ? h("span", { class: "soft" }, ` ${row.round}`) : null), ...cells);
     }
     this.changedRows.clear();
+    if (!isNew || wide || this.votes.offsetWidth <= this.votes.parentElement!.clientWidth) return;
+    this.isWide = true;
+    this.shownRows.clear();
+    this.showVotes();
   }
 
   /** The newest stand first, so nothing has to be measured and scrolled. */

@@ -99,7 +99,7 @@ export class Picture {
     if (isFirst) this.fit();
     else this.zoomTo(this.scale);
     this.showAll();
-    if (this.chosen) this.choose(...this.chosen);
+    if (this.chosen) this.bring(this.choose(...this.chosen));
     if (hadFocus) this.element.focus();
   }
 
@@ -188,8 +188,9 @@ export class Picture {
     });
   }
 
-  /** Show which place or transition is chosen. */
-  choose(kind: string, name: string): void {
+  /** Show which place or transition is chosen, and bring another one than before into sight. */
+  choose(kind: string, name: string): Element[] {
+    const isAnother = this.chosen?.[0] !== kind || this.chosen[1] !== name;
     this.chosen = [kind, name];
     const chosen = kind === "place" ? [this.spots.get(name)?.group] : (this.bars.get(name) ?? []);
     const all = [...[...this.spots.values()].map((one) => one.group), ...[...this.bars.values()].flat()];
@@ -199,6 +200,9 @@ export class Picture {
       if (chosen.includes(one)) one.setAttribute("aria-pressed", "true");
       else one.removeAttribute("aria-pressed");
     }
+    const there = chosen.filter((one) => one !== undefined);
+    if (isAnother) this.bring(there);
+    return there;
   }
 
   /** Show tokens, gates, and what may fire; of transitions that are not told what was told before holds on. */
@@ -280,8 +284,12 @@ export class Picture {
 
   /** Scroll to what has fired, if nothing of it is in sight. */
   reveal(fired: Iterable<string>): void {
+    this.bring([...fired].flatMap((name) => this.bars.get(name) ?? []));
+  }
+
+  private bring(parts: Element[]): void {
     const room = this.element.getBoundingClientRect();
-    const bars = [...fired].flatMap((name) => this.bars.get(name) ?? []).map((bar) => bar.getBoundingClientRect());
+    const bars = parts.map((part) => part.getBoundingClientRect());
     const inSight = (bar: DOMRect): boolean => bar.top >= room.top && bar.bottom <= room.bottom && bar.right > room.left && bar.left < room.right;
     if (bars.length === 0 || bars.some(inSight)) return;
     const { x, y, width, height } = bars[0]!;

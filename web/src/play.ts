@@ -69,7 +69,7 @@ export class Play {
     this.steps = [{ what: "the initial marking", moment: "scene" in page.top ? { ...page.moment, top: page.top } : page.moment }];
     const editButton = this.button("Edit", "Edit the net file", () => void this.beginEdit());
     this.frame.tools.append(this.undoButton, this.redoButton, this.resetButton, this.gatesSwitch, editButton);
-    if (page.editable) watchFile(this.frame, () => page.shown, this.to.reload);
+    if (page.editable) watchFile(this.frame, () => page.shown, () => true, this.to.reload);
     this.gatesSwitch.title = "Free: external gates are open, as the analysis has them. Else they are as the signals say.";
     this.frame.side.append(
       h("div", { class: "own" }, panel("May fire", this.mayFire), this.waitPanel),

@@ -141,6 +141,8 @@ export interface EditState {
   why_not?: string;
   text: string;
   version: string;
+  /** Whether the text is a net: the one that is shown. */
+  is_net: boolean;
   shown: number;
   undo: string | null;
   redo: string | null;
@@ -154,7 +156,7 @@ export interface Written {
   edit: EditState;
 }
 
-/** A text that is no net and was not written. */
+/** A text that is no net and was not written; with a version it is the file itself, which somebody else has written so. */
 export interface Draft {
   errors: Problem[];
   draft: string;
@@ -170,7 +172,8 @@ export class Refused extends Error {
     readonly status: number,
     readonly problems: Problem[],
   ) {
-    super(problems.map((one) => one.message).join("; ") || `the server answers ${status}`);
+    const unknown = "the command has been started anew and does not know this window: open the address that it has printed";
+    super(problems.map((one) => one.message).join("; ") || (status === 401 ? unknown : `the server answers ${status}`));
   }
 }
 

@@ -64,9 +64,10 @@ export class TextPane {
     this.area.scrollTop = Math.max(0, at - 3) * this.lineHeight();
   }
 
-  /** A text that is no net: not written, to be mended here. What was typed since `sent` is kept. */
-  refuse(problems: Problem[], draft: string, sent: string | null): void {
+  /** A text that is no net, to be mended here: not written, or that of the file. What was typed since `sent` is kept. */
+  refuse(problems: Problem[], draft: string, sent: string | null, isFile: boolean): void {
     if (sent === null || this.area.value === sent) this.area.value = draft;
+    if (isFile) this.saved = this.area.value;
     this.element.open = true;
     this.show(problems);
     const first = problems.find((one) => one.line !== null);
@@ -114,7 +115,7 @@ export class TextPane {
     );
     this.area.setAttribute("aria-invalid", String(problems.length > 0));
     this.saveButton.disabled = this.dropButton.disabled = !this.dirty;
-    this.state.textContent = problems.length > 0 ? `no net: ${counted(problems.length, "problem")}, not written` : this.dirty ? "not written yet" : "";
+    this.state.textContent = problems.length > 0 ? `no net: ${counted(problems.length, "problem")}${this.dirty ? ", not written" : ""}` : this.dirty ? "not written yet" : "";
     this.scrolled();
   }
 

@@ -42,6 +42,19 @@ export type TopStart = { why_not: string } | (Top & { view: View });
 const PLAYED_S = 0.7;
 const MARGIN = 95;
 const WIDTH = 44;
+/** So many letters of a name have room beside their neighbours: of a machine, of a belt, of a station, and inside an arm. */
+const NAME_LONGEST = 12;
+const BELT_LONGEST = 23;
+const SPOT_LONGEST = 17;
+const INSIDE_LONGEST = 5;
+
+/** Names that differ at their ends only are told apart, so what is left out is the middle. */
+function shortened(words: string, longest: number): string {
+  const all = [...words];
+  if (all.length <= longest) return words;
+  const tail = Math.floor((longest - 1) / 2);
+  return `${all.slice(0, longest - 1 - tail).join("")}…${all.slice(-tail).join("")}`;
+}
 
 function polar([x, y]: Spot, at: Spot): { turn: number; length: number } {
   return { turn: (Math.atan2(at[1] - y, at[0] - x) * 180) / Math.PI, length: Math.hypot(at[0] - x, at[1] - y) };
@@ -81,9 +94,13 @@ export class TopView {
     return made;
   }
 
-  private label(x: number, y: number, words: string, kind = "name"): SVGTextElement {
+  private label(x: number, y: number, words: string, kind = "name", longest = NAME_LONGEST): SVGTextElement {
     const made = svg("text", { x, y, class: kind, "text-anchor": "middle" });
-    made.textContent = words;
+    made.textContent = shortened(words, kind === "name" ? longest : SPOT_LONGEST);
+    if (made.textContent === words) return made;
+    const title = svg("title");
+    title.textContent = words;
+    made.append(title);
     return made;
   }
 
@@ -99,7 +116,7 @@ export class TopView {
       const turn = `translate(${(x1 + x2) / 2} ${(y1 + y2) / 2}) rotate(${(Math.atan2(y2 - y1, x2 - x1) * 180) / Math.PI})`;
       const inner = svg("g", { transform: turn });
       inner.append(svg("rect", { x: -length / 2, y: -WIDTH / 2 - 5, width: length, height: WIDTH + 10, rx: 8, class: "body" }), svg("path", { d: `M${-length / 2 + 6} 0H${length / 2 - 6}`, class: "running" }));
-      belt.append(inner, this.label((x1 + x2) / 2, (y1 + y2) / 2 + WIDTH / 2 + 22, name), this.label((x1 + x2) / 2, (y1 + y2) / 2 + WIDTH / 2 + 37, "", "doing"));
+      belt.append(inner, this.label((x1 + x2) / 2, (y1 + y2) / 2 + WIDTH / 2 + 22, name, "name", BELT_LONGEST), this.label((x1 + x2) / 2, (y1 + y2) / 2 + WIDTH / 2 + 37, "", "doing"));
     }
     for (const [name, [x, y]] of Object.entries(view.tables)) {
       const table = this.group(name, "table");
@@ -107,7 +124,8 @@ export class TopView {
     }
     for (const [name, [x, y]] of Object.entries(view.others)) {
       const other = this.group(name, "other");
-      other.append(svg("rect", { x: x - 40, y: y - 26, width: 80, height: 52, rx: 8, class: "body" }), this.label(x, y + 5, name), this.label(x, y + 44, "", "doing"));
+      const half = Math.max(40, 4.7 * Math.min(name.length, NAME_LONGEST) + 2);
+      other.append(svg("rect", { x: x - half, y: y - 26, width: 2 * half, height: 52, rx: 8, class: "body" }), this.label(x, y + 5, name), this.label(x, y + 44, "", "doing"));
     }
     for (const [name, [x, y]] of Object.entries(view.stations)) {
       const station = svg("g", { class: "station" });
@@ -131,7 +149,12 @@ export class TopView {
     hand.append(svg("path", { d: "M-15 -13h30M-15 13h30M-15 -13v26" }));
     arm.append(reach, hand);
     const side = y > 0 ? 1 : -1;
-    group.append(arm, svg("circle", { cx: x, cy: y, r: 24, class: "body" }), this.label(x, y + 5, name), this.label(x, y + side * 44 + (side > 0 ? 8 : 0), "", "doing"));
+    const label = this.label(x, y + 5, name);
+    if ([...name].length > INSIDE_LONGEST) {
+      label.setAttribute("x", String(x + 32));
+      label.setAttribute("text-anchor", "start");
+    }
+    group.append(arm, svg("circle", { cx: x, cy: y, r: 24, class: "body" }), label, this.label(x, y + side * 62 + (side > 0 ? 8 : 0), "", "doing")); // beyond a hand at home
     this.hands.set(name, { arm, reach, hand });
   }
 
@@ -143,7 +166,7 @@ export class TopView {
     for (const [name, group] of this.machines) {
       const doing = top.doing[name];
       group.classList.toggle("busy", doing !== undefined);
-      group.querySelector(".doing")!.textContent = doing === undefined ? "" : doing.command.slice(name.length + 1);
+      group.querySelector(".doing")!.textContent = doing === undefined ? "" : shortened(doing.command.slice(name.length + 1), SPOT_LONGEST);
     }
     for (const name of this.hands.keys()) this.reach(view.arms[name]!, name, this.handAt(view, top, name), lasting(name));
     const there = new Set<number>();
