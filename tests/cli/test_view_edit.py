@@ -297,6 +297,32 @@ def test_a_file_that_is_gone_is_named(chromium: Browser, served: tuple[str, Path
 
 
 @needs_browser
+def test_an_edit_is_undone_from_the_field_that_made_it_and_what_is_typed_there_is_not(
+    chromium: Browser, served: tuple[str, Path], file: Path
+) -> None:
+    with page_at(chromium, served[0]) as page:
+        begin(page)
+        page.get_by_label("Chosen").select_option("place:robot.busy")
+        page.get_by_label("a token at first").focus()
+        page.keyboard.press("Space")
+        done(page, "a token on robot.busy")
+        expect(page.get_by_label("a token at first")).to_be_focused()
+        page.keyboard.press("Control+z")
+        expect(page.locator(".status")).to_have_text("Undone: a token on robot.busy.")
+        words = page.get_by_label("Description")
+        words.fill("on its way")
+        page.keyboard.press("Enter")
+        done(page, "robot.busy described")
+        expect(words).to_be_focused()
+        page.keyboard.type("!")
+        page.keyboard.press("Control+z")
+        expect(words).to_have_value("on its way")
+        page.keyboard.press("Control+z")
+        expect(page.locator(".status")).to_have_text("Undone: robot.busy described.")
+        assert file.read_text() == TEXT
+
+
+@needs_browser
 def test_what_is_chosen_by_its_name_is_brought_into_sight(chromium: Browser, tmp_path: Path) -> None:
     path = tmp_path / "cell.firable.yaml"
     path.write_text(catalogue_path("one_robot").read_text())

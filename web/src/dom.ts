@@ -33,6 +33,12 @@ export function announce(words: string): void {
   if (region !== null) region.textContent = words;
 }
 
+/** Whether Ctrl+Z there is about what is being typed, and not about what was done on the page. */
+export function isTyping(where: EventTarget | null): boolean {
+  if (where instanceof HTMLInputElement) return where.type === "text" && where.value !== where.defaultValue;
+  return where instanceof HTMLTextAreaElement;
+}
+
 export const counted = (n: number, word: string): string => `${n.toLocaleString("en")} ${word}${n === 1 ? "" : "s"}`;
 
 export const calm = (): boolean => matchMedia("(prefers-reduced-motion: reduce)").matches;

@@ -1,7 +1,7 @@
 // Editing the net. What is done here is asked of the server, which does it to the text of the file and reads that again;
 // the page shows what came of it: the net, or why there is none, at the line where it is.
 
-import { announce, h } from "./dom";
+import { announce, h, isTyping } from "./dom";
 import { Drawing } from "./drawing";
 import { Details, type Chosen, type Doing } from "./edit_details";
 import { banner, frame, panel, watchFile, type Frame } from "./frame";
@@ -190,7 +190,7 @@ export class Edit {
   private key(event: KeyboardEvent): void {
     if (event.key === "Escape" && this.tool !== "choose") return this.take("choose");
     if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z") return;
-    if (event.target instanceof HTMLInputElement || event.target instanceof HTMLTextAreaElement) return;
+    if (isTyping(event.target)) return;
     event.preventDefault();
     void this.step(event.shiftKey ? "redo" : "undo");
   }

@@ -299,7 +299,7 @@ export class Live {
       const all = row.parts.every((part) => ["ready", "yes", "promised", "applied", "ordered"].includes(part.vote));
       shown.className = row.round || (all ? "all" : "");
       const cells = wide
-        ? [h("td", { class: "parts" }, ...row.parts.flatMap((part) => [h("span", {}, ` ${part.controller} `), marked(part.vote)]))]
+        ? [h("td", { class: "parts" }, ...row.parts.flatMap((part) => [h("span", { class: "part" }, `${part.controller} `, marked(part.vote)), " "]))]
         : controllers.map((one) => h("td", {}, of.has(one) ? marked(of.get(one)!) : null));
       shown.replaceChildren(h("th", { scope: "row", title: row.says }, row.name, row.round ? h("span", { class: "soft" }, ` ${row.round}`) : null), ...cells);
     }

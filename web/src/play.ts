@@ -1,6 +1,6 @@
 // Playing with a net. The page holds where it is and where it was; what may fire, and what comes of it, it asks.
 
-import { announce, counted, h } from "./dom";
+import { announce, counted, h, isTyping } from "./dom";
 import { banner, frame, panel, watchFile, type Frame } from "./frame";
 import { Drawing } from "./drawing";
 import type { Picture } from "./picture";
@@ -218,7 +218,7 @@ export class Play {
 
   private key(event: KeyboardEvent): void {
     if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z") return;
-    if (event.target instanceof HTMLInputElement || event.target instanceof HTMLTextAreaElement) return;
+    if (isTyping(event.target)) return;
     event.preventDefault();
     if (event.shiftKey) this.redo();
     else this.undo();
