@@ -38,7 +38,7 @@ _ARC: Final = 26.0
 _RADIUS: Final = 5.2
 _CHARACTERS: Final = 30
 _END_LINE: Final = 14.0
-_END_LINES_MAX: Final = 24
+_END_LINES_MAX: Final = 48
 
 _STYLE: Final = """
 .frame{fill:#fff;stroke:#9aa6b2}
@@ -90,11 +90,17 @@ def draw_strip(
     return "\n".join(_Writer(net, frames, caption, end, width_max).lines()) + "\n"
 
 
+def _in_lines(told: Sequence[str], characters: int) -> list[str]:
+    """Sentences in lines, each after a little space: a line without words."""
+    lines = [line for text in told for line in (*wrapped(text, characters, _END_LINES_MAX), "")]
+    return lines[: min(_END_LINES_MAX, len(lines) - 1)] if lines else []
+
+
 class _Writer:
     """One strip."""
 
     def __init__(self, net: Net, frames: Sequence[Frame], caption: str, end: Sequence[str], width_max: float) -> None:
-        self.net, self.caption = net, caption
+        self.net, self.caption, self.told = net, caption, end
         start = frames[0].before if frames else net.initial_marking
         kept = list(frames)
         self.left_out = max(0, len(kept) - STEPS_MAX)
@@ -102,9 +108,7 @@ class _Writer:
             kept[STEPS_MAX // 2 : len(kept) - STEPS_MAX // 2] = []
         self.frames = [Frame(0, (), start, start), *kept]
         self.gap_at = STEPS_MAX // 2 if self.left_out else -1
-        # Each sentence after a little space: a line without words.
-        told = [line for text in end for line in (*wrapped(text, _CHARACTERS + 6, 4), "")][:_END_LINES_MAX]
-        self.end = told[:-1] if told and not told[-1] else told
+        self.end = _in_lines(end, _CHARACTERS + 6)
         self.boxes = self._boxes()
         bars = max([0, *(len(frame.fired) for frame in self.frames)])
         self.bars_width = bars * _BAR_STEP + _ARC if bars else 12.0
@@ -176,9 +180,11 @@ class _Writer:
         end_x, end_y = self.places[-1][0] + self.frame_width + 12, self.places[-1][1]
         if self.end and len(self.places) >= self.per_row and end_x + self.end_width > right + 40:
             end_x, end_y = MARGIN, bottom + 4
-            bottom += _END_LINE * len(self.end) + 8
+            self.end = _in_lines(self.told, max(_CHARACTERS + 6, int((right - MARGIN) / (NAME.character_px * 0.9))))
         elif self.end:
             right = max(right, end_x + self.end_width)
+        if self.end:
+            bottom = max(bottom, end_y + _END_LINE * len(self.end) + 12)
         width = max(right + MARGIN, least_width(self.net.name, self.caption), 480.0)
         title = f"{self.net.name}: {self.caption}" if self.caption else self.net.name
         style = scoped("strip", _STYLE)

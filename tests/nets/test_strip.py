@@ -2,6 +2,8 @@
 
 import xml.etree.ElementTree as ET
 
+import pytest
+
 from firable.nets.catalogue import catalogue_net
 from firable.nets.drawing import Frame, draw_strip
 from firable.nets.drawing.strip import STEPS_MAX
@@ -96,3 +98,20 @@ def test_the_end_of_a_run_is_told_beside_its_last_frame() -> None:
         "Deadlock: nothing fires.",
         "a waits for b",
     ]
+
+
+@pytest.mark.parametrize("steps", [1, 8])
+def test_what_is_told_of_the_end_is_told_whole_and_over_nothing_else(steps: int) -> None:
+    net = Net(
+        "ring",
+        (Place("p", marked=True), Place("q")),
+        (Transition("t", ("p",), ("q",)), Transition("u", ("q",), ("p",))),
+    )
+    end = [
+        f"{place} (a place and words that say what it is) waits in a transition for another" for place in "abcdef"
+    ]
+    svg = ET.fromstring(draw_strip(net, frames(net, *["t", "u"][:steps] * (steps // 2 or 1)), end=end))
+    lines = [text for text in svg.iter(f"{SVG}text") if text.get("class") == "end"]
+    assert " ".join(text.text or "" for text in lines).split() == " ".join(end).split()
+    (legend, *_) = [text for text in svg.iter(f"{SVG}text") if text.text == "fires in this step"]
+    assert max(float(line.get("y", "0")) for line in lines) < float(legend.get("y", "0")) - 12
