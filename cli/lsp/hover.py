@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from firable.nets.net import ExternalGate, Net, Place, SignalKind
 from firable.nets.occurrences import Kind, Occurrence
 from firable.nets.time_limits import format_time
+from firable.nets.verdict import counted
 
 
 def hover(net: Net, one: Occurrence) -> str:
@@ -108,7 +109,7 @@ def _controller(net: Net, name: str) -> Iterator[str]:
             signals = sum(signal.owner == name for signal in net.signals)
             role = "The coordinator" if controller.coordinator else "A controller"
             yield ""
-            yield f"{role} with {places} places and {signals} signals."
+            yield f"{role} with {counted(places, 'place')} and {counted(signals, 'signal')}."
 
 
 def _arbiter(net: Net, name: str) -> Iterator[str]:

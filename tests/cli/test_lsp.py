@@ -18,6 +18,7 @@ from pygls.lsp.client import LanguageClient
 from firable.cli.lsp.hover import hover
 from firable.cli.lsp.server import _changed, _show
 from firable.nets.catalogue import catalogue_net, catalogue_path
+from firable.nets.net import Controller, Net, Place
 from firable.nets.occurrences import Kind, Occurrence
 from firable.nets.source import Source
 
@@ -356,6 +357,11 @@ def test_what_the_file_expects_of_no_verdict_is_told_at_its_place(tmp_path: Path
         assert "deadlock-fre" in wrong.message
 
     within(tmp_path / "cell.firable.yaml", act)
+
+
+def test_a_controller_tells_how_many_places_and_signals_it_has() -> None:
+    net = Net("n", (Place("c.p", owner="c"),), (), controllers=(Controller("c"),))
+    assert "A controller with 1 place and 0 signals." in hover(net, Occurrence(Kind.CONTROLLER, "c", 1, 1, 1))
 
 
 def test_names_are_offered_while_a_bracket_is_open_and_take_the_place_of_what_is_typed(

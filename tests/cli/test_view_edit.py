@@ -103,10 +103,16 @@ def test_a_net_is_edited_in_the_picture_and_by_names_and_all_is_undone(
     with page_at(chromium, served[0]) as page:
         begin(page)
         adding = page.locator(".panel").filter(has=page.get_by_role("heading", name="Add"))
+        adding.get_by_label("Owner").select_option("robot")
+        adding.get_by_label("Name").fill("free")
+        page.keyboard.press("Enter")
+        expect(page.get_by_role("alert")).to_contain_text("there is a 'free' already")
+        expect(adding.get_by_label("Name")).to_have_value("free")
         adding.get_by_label("Name").fill("done")
         adding.get_by_label("Owner").select_option("mc")
         page.keyboard.press("Enter")
         done(page, "place done added")
+        expect(adding.get_by_label("Name")).to_have_value("")
         page.get_by_role("button", name="Arc").click()
         page.locator('[id="transition:go"] rect.hit').first.click()
         page.locator('[id="place:mc.done"] circle.place').click()
@@ -318,8 +324,12 @@ def test_an_edit_is_undone_from_the_field_that_made_it_and_what_is_typed_there_i
         page.keyboard.press("Control+z")
         expect(words).to_have_value("on its way")
         page.keyboard.press("Control+z")
+        page.keyboard.press("Control+z")  # which finds nothing more to undo
         expect(page.locator(".status")).to_have_text("Undone: robot.busy described.")
         assert file.read_text() == TEXT
+        page.keyboard.press("Control+Shift+z")
+        expect(page.locator(".status")).to_have_text("Done: robot.busy described.")
+        expect(page.locator(".banner")).to_have_count(0)
 
 
 @needs_browser

@@ -15,6 +15,7 @@ START = "stacking_robot_starts_for_the_crate_under_the_scanner"
 NET = f"""\
 firable: 1
 cell: long
+description: two robots take crates from the infeed and stack them, and what the scanner cannot read gets another label
 controllers:
   stacking_robot_with_vacuum_gripper:
     start: home
@@ -93,6 +94,20 @@ def test_long_names_stay_in_their_panels(chromium: Browser, address: str, width:
         expect(page.get_by_role("button", name="Rename")).to_be_visible()
         stays_inside(page)
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+@needs_browser
+@pytest.mark.parametrize("size", [(1280, 800), (1000, 480)])
+def test_a_wide_window_is_filled_and_not_scrolled(chromium: Browser, address: str, size: tuple[int, int]) -> None:
+    with page_at(chromium, address, viewport={"width": size[0], "height": size[1]}) as page:
+        expect(page.locator(".picture .drawing-note")).to_be_hidden()
+        assert page.evaluate("document.documentElement.scrollHeight") == size[1]
+        boxes = [page.locator(one).bounding_box() for one in ("header", ".stage", "aside")]
+        head, *below = [box for box in boxes if box is not None]
+        assert len(below) == 2
+        for box in below:
+            assert abs(box["y"] - head["height"]) < 1
+            assert abs(box["y"] + box["height"] - size[1]) < 1
 
 
 @needs_browser

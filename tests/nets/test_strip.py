@@ -107,9 +107,7 @@ def test_what_is_told_of_the_end_is_told_whole_and_over_nothing_else(steps: int)
         (Place("p", marked=True), Place("q")),
         (Transition("t", ("p",), ("q",)), Transition("u", ("q",), ("p",))),
     )
-    end = [
-        f"{place} (a place and words that say what it is) waits in a transition for another" for place in "abcdef"
-    ]
+    end = [f"{place} (a place and words that say what it is) waits in a transition for another" for place in "abcdef"]
     svg = ET.fromstring(draw_strip(net, frames(net, *["t", "u"][:steps] * (steps // 2 or 1)), end=end))
     lines = [text for text in svg.iter(f"{SVG}text") if text.get("class") == "end"]
     assert " ".join(text.text or "" for text in lines).split() == " ".join(end).split()

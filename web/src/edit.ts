@@ -78,7 +78,7 @@ export class Edit {
   }
 
   private does(what: Doing): Promise<void> {
-    return this.ask("api/edit", what, what.then);
+    return this.ask("api/edit", what, what.then, null, what.done);
   }
 
   private step(which: "undo" | "redo"): Promise<void> {
@@ -91,8 +91,10 @@ export class Edit {
   }
 
   /** Ask for an edit, after all that was asked for before it; `sent` is the text that was typed, if that is one. */
-  private ask(path: string, body: object, then?: Chosen, sent: string | null = null): Promise<void> {
+  private ask(path: string, body: object, then?: Chosen, sent: string | null = null, done?: () => void): Promise<void> {
     this.queue = this.queue.then(async () => {
+      const { undo, redo } = this.state;
+      if ((path === "api/edit/undo" && undo === null) || (path === "api/edit/redo" && redo === null)) return; // by the keyboard, or a second click
       if (path !== "api/edit/text" && path !== "api/edit/reload" && this.pane.dirty) {
         banner(this.frame.banner, "open", "The text below is not written: save it or discard it first.");
         return;
@@ -102,8 +104,10 @@ export class Edit {
       this.pane.hold(sent === null);
       try {
         const answer = await ask<Edited>(path, { version: this.state.version, ...body, then: undefined });
-        if ("page" in answer) this.takeOver(answer, then, sent);
-        else this.refuse(answer, sent);
+        if ("page" in answer) {
+          this.takeOver(answer, then, sent);
+          done?.();
+        } else this.refuse(answer, sent);
       } catch (error) {
         this.fail(error, path === "api/edit/reload" ? `${this.page.file}: ` : "");
       } finally {

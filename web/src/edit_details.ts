@@ -11,8 +11,8 @@ export interface Chosen {
   name: string;
 }
 
-/** An edit, as the server knows it; `then` is chosen once it is done. */
-export type Doing = { do: string; then?: Chosen } & Record<string, unknown>;
+/** An edit, as the server knows it; `then` is chosen once it is done, and `done` called. */
+export type Doing = { do: string; then?: Chosen; done?: () => void } & Record<string, unknown>;
 
 const PART_WORDS: Record<Part, string> = { from: "Takes from", to: "Puts to", if: "Gate if", unless: "Gate unless" };
 const NOBODY = "(nobody)";
@@ -159,8 +159,7 @@ export class Details {
         const own = owner.hidden ? null : owner.querySelector("select")!.value || null;
         const made = kind.value === "sensor" ? "signal" : (kind.value as Kind);
         const local = name.value.trim();
-        this.does({ do: "add", kind: made, name: local, owner: own, then: { kind: made, name: own ? `${own}.${local}` : local } });
-        name.value = "";
+        this.does({ do: "add", kind: made, name: local, owner: own, then: { kind: made, name: own ? `${own}.${local}` : local }, done: () => (name.value = "") });
       },
     }, this.field("What", kind), this.field("Name", name), owner, h("button", {}, "Add")));
   }
