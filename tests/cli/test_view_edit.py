@@ -245,6 +245,32 @@ def test_a_file_that_somebody_else_has_changed_is_not_written_over(
 
 
 @needs_browser
+def test_a_file_that_is_loaded_again_while_a_run_is_played_is_played_by_hand(
+    chromium: Browser, served: tuple[str, Path], file: Path
+) -> None:
+    stuck = TEXT.replace("  back: {from: robot.busy, to: robot.free}   # and back\n", "")
+    file.write_text(stuck)
+    assert asked(served[0], "reload", {})[0] == 200
+    with page_at(chromium, served[0]) as page:
+        page.get_by_role("button", name="Check this net").click()
+        page.get_by_role("button", name="▶ Play deadlock-free").click()
+        page.get_by_role("region", name="The run deadlock-free").get_by_role("button", name="▶ Play").click()
+        expect(page.get_by_role("heading", name="May fire")).to_be_hidden()
+        file.write_text(TEXT)
+        page.get_by_role("button", name="Load it again").click()
+        expect(page.get_by_role("heading", name="May fire")).to_be_visible()
+        refused = page.evaluate(
+            """() => new Promise((told) => {
+                const before = window.fetch;
+                let asked = 0;
+                window.fetch = (path, ...more) => { asked += path === "api/moment"; return before(path, ...more); };
+                setTimeout(() => told(asked), 2500);
+            })"""
+        )
+        assert refused == 0, "the clock of the run that was played goes on"
+
+
+@needs_browser
 def test_an_edit_in_another_window_is_told_and_can_be_undone_in_both(
     chromium: Browser, served: tuple[str, Path], file: Path
 ) -> None:

@@ -79,6 +79,7 @@ export class Play {
     this.makeSwitches();
     this.showChecks(page.verdicts, page.runs);
     addEventListener("keydown", (event) => this.key(event), { signal: this.frame.gone });
+    this.frame.gone.addEventListener("abort", () => this.playback?.stop());
     const kept = sessionStorage.getItem(KEPT);
     this.show();
     void this.goOn(kept ?? "{}");
@@ -398,7 +399,7 @@ export class Play {
         return moment;
       }, (here) => this.ended(here));
       this.frame.below.replaceChildren(this.playback.element);
-      document.body.classList.add("playing");
+      this.frame.side.classList.add("playing");
       this.frame.status.className = "status";
       this.frame.status.textContent = `Playing ${name}`;
       for (const button of this.frame.tools.querySelectorAll("button")) button.disabled = true;
@@ -409,7 +410,7 @@ export class Play {
   private ended(here: Moment | null): void {
     this.playback = null;
     this.frame.below.replaceChildren();
-    document.body.classList.remove("playing");
+    this.frame.side.classList.remove("playing");
     for (const button of this.frame.tools.querySelectorAll("button")) button.disabled = false; // show() knows of the others
     if (here !== null) this.add("where the run was left", here);
     else this.show();
