@@ -75,8 +75,7 @@ vertical-align:top}
 .verdict{display:grid;grid-template-columns:7.2rem 1fr;gap:.15rem .9rem;padding:.6rem 0;
 border-bottom:1px solid var(--line)}
 .verdict:last-child{border-bottom:0}
-.verdict p{margin:.1rem 0}
-.verdict .what{overflow-wrap:anywhere}
+.verdict p{margin:.1rem 0}p,ul{overflow-wrap:anywhere}
 .verdict .code{color:var(--soft)}
 .hint{color:var(--soft);border-left:3px solid var(--line);padding-left:.7rem}
 .outcome{font-weight:600;border-left:3px solid var(--bad);padding-left:.7rem;margin:.9rem 0;overflow-wrap:anywhere}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser
@@ -72,6 +73,19 @@ def test_the_window_shows_the_whole_width_and_every_link(
             needed, there = page.evaluate(WINDOW)
             assert needed <= there
         assert page.evaluate(CUT_OFF) == 0
+
+
+@needs_browser
+def test_what_is_told_of_transitions_with_long_names_is_not_cut_off(chromium: Browser, tmp_path: Path) -> None:
+    net, page = tmp_path / "net.firable.yaml", tmp_path / "page.html"
+    one, other = "lathe_takes_the_next_workpiece_from_the_robot", "lathe_gives_the_workpiece_back_to_the_conveyor"
+    inputs = "from: robot_of_the_cell.holding_a_workpiece, to: robot_of_the_cell.empty_handed"
+    again = LONG_NAMES.replace("transitions:", f"transitions:\n  {one}: {{{inputs}}}\n  {other}: {{{inputs}}}")
+    net.write_text(again, "utf-8")
+    main(["check", str(net), "--report", str(page), "--no-cache"])
+    with page_at(chromium, page.as_uri(), viewport={"width": 360, "height": 900}) as shown:
+        needed, there = shown.evaluate(WINDOW)
+        assert needed <= there
 
 
 @needs_browser
