@@ -85,6 +85,33 @@ def test_a_click_fires_what_may_fire_and_a_switch_opens_a_gate(chromium: Browser
 
 
 @needs_browser
+def test_who_drags_the_picture_by_a_transition_does_not_fire_it(chromium: Browser, late: str) -> None:
+    with page_at(chromium, late) as page:
+        page.get_by_role("switch", name="Gates free").click()
+        for _ in range(5):
+            page.get_by_role("button", name="Larger").click()
+        bar = page.locator('[id="transition:G1"] rect.hit').first
+        expect(page.locator('[id="transition:G1"]').first).to_contain_class("may-fire")
+        page.locator(".picture").evaluate("one => one.scrollTo(0, 0)")
+        bar.scroll_into_view_if_needed()
+        before, room = bar.bounding_box(), page.locator(".picture").bounding_box()
+        assert before is not None
+        assert room is not None
+        x, y = max(before["x"], room["x"]) + 60, before["y"] + before["height"] / 2
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x - 40, y - 20, steps=6)
+        page.mouse.up()
+        after = bar.bounding_box()
+        assert after is not None
+        assert before["x"] - after["x"] == pytest.approx(40, abs=2)
+        assert before["y"] - after["y"] == pytest.approx(20, abs=2)
+        expect(page.locator(".log li")).to_have_count(2)  # the initial marking, and the switch
+        bar.click()
+        expect(page.locator("#said")).to_contain_text("G1 has fired")
+
+
+@needs_browser
 def test_what_may_not_fire_says_and_shows_what_is_missing(chromium: Browser, late: str) -> None:
     with page_at(chromium, late) as page:
         page.locator('[id="transition:G6"] rect.hit').first.click()

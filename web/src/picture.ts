@@ -38,6 +38,8 @@ interface Spot {
 
 /** So much of the top is left out: the title of the drawing stands in the head of the page. */
 const TITLE_HEIGHT = 56;
+/** Who moves the pointer by so many pixels between press and release drags the picture. */
+const DRAGGED = 5;
 const KINDS_OF_ARC = new Map([["input", false], ["output", true]]);
 
 export class Picture {
@@ -321,15 +323,20 @@ export class Picture {
 
   private pan(): void {
     let from: { x: number; y: number } | null = null;
+    let moved = 0;
     this.element.addEventListener("pointerdown", (event) => {
+      moved = 0;
       if (event.pointerType === "mouse" && event.button === 0) from = { x: event.clientX, y: event.clientY };
     });
     addEventListener("pointermove", (event) => {
       if (from === null) return;
       this.element.scrollBy(from.x - event.clientX, from.y - event.clientY);
+      moved += Math.hypot(from.x - event.clientX, from.y - event.clientY);
       from = { x: event.clientX, y: event.clientY };
     });
     addEventListener("pointerup", () => (from = null));
+    // What was dragged has moved with the pointer, which is released over it: that is no click.
+    this.element.addEventListener("click", (event) => moved > DRAGGED && event.stopPropagation(), { capture: true });
     this.element.addEventListener(
       "wheel",
       (event) => {
