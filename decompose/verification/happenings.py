@@ -20,7 +20,7 @@ place waits until then.
     arrives/E, leaves/E   a workpiece comes, or is taken away
     X/judged           the workpiece on a station is found good, or not
     S/drops, S/returns, S/clears     a sensor that is not exact
-    S/pressed, S/released            a key
+    S/pressed, S/released            a key;     S/set, S/reset   what somebody outside the cell sets
     S/over             a time limit that somebody reads
     S/told             a controller is told of a signal that has changed some moment before
 
@@ -82,8 +82,12 @@ class Plant(Things):
         for name in self.late:
             yield f"{name}/told", partial(self.told, name)
         for name, sensor in self.model.sensors.items():
+            ways: dict[str, Happens] = {}
             if sensor.acknowledges is not None:
-                yield f"{name}/released", partial(self.released, name)
+                ways = {"pressed": partial(self.pressed, name), "released": partial(self.released, name)}
+            elif sensor.set_by is not None:
+                ways = {way: partial(self.set_from_outside, name, value=way == "set") for way in ("set", "reset")}
+            yield from ((f"{name}/{way}", partial(self.once_it_is_told, name, does)) for way, does in ways.items())
 
     def _in_the_plant(self) -> Iterator[tuple[str, Happens]]:
         for place in self.commanding:
@@ -106,10 +110,6 @@ class Plant(Things):
         for station in sorted(self.judged):
             yield f"{station}/judged", partial(self.judges, station)
         for name, sensor in self.model.sensors.items():
-            if sensor.acknowledges is not None:
-                yield f"{name}/pressed", partial(self.pressed, name)
-            for way, value in (("set", True), ("reset", False)) if sensor.set_by is not None else ():
-                yield f"{name}/{way}", partial(self.set_from_outside, name, value=value)
             for way, may in (
                 ("drops", sensor.may_flicker),
                 ("returns", sensor.may_flicker),
@@ -122,6 +122,11 @@ class Plant(Things):
         """Nothing happens at the machines while a controller is still to be told of what has."""
         if not any(state[f"news of {name}"] for name in self.late):
             yield from self.is_news(happens, state)
+
+    def once_it_is_told(self, name: str, happens: Happens, state: State) -> Iterator[Changes]:
+        """Nobody outside waits until a controller is told of anything but what was done to this very signal before."""
+        if name not in self.late or not state[f"news of {name}"]:
+            yield from happens(state)
 
     def is_news(self, happens: Happens, state: State) -> Iterator[Changes]:
         """What happens, with what controllers are told of it at once, and what is news to them."""

@@ -401,12 +401,13 @@ class _Closing:
             sensor, (done, undone) = self.model.sensors[name], self.hand_words(name)
             on = Case(((name, False), (self.let_go(name), True)), ((name, True), (self.let_go(name), False)))
             by = f" by {sensor.set_by}" if sensor.set_by is not None else ""
-            yield from self.named(f"{name}/{done}", f"{name} is {done}{by}", each(start, [on]))
-            off, quiet = Case(on.leaves, on.wants), start
+            off = Case(on.leaves, on.wants)
             if sensor.acknowledges is not None:
-                # The next command to the machine releases it: so it holds until what waits for it has fired (O4), and
-                # is told of in any order with what else comes of that command.
-                off, quiet = replace(off, wants=((self.laws.idle(sensor.acknowledges), False), *off.wants)), calm
+                # The next command to the machine releases it: so it holds until what waits for it has fired (O4).
+                off = replace(off, wants=((self.laws.idle(sensor.acknowledges), False), *off.wants))
+            # Nobody outside waits until controllers are told of anything else; one who does it twice tells them twice.
+            quiet = each(calm, [self.telling.is_told(name)])
+            yield from self.named(f"{name}/{done}", f"{name} is {done}{by}", each(quiet, [on]))
             yield from self.named(f"{name}/{undone}", f"{name} is {undone}{by}", each(quiet, [off]))
 
     def times(self) -> Iterator[Transition]:

@@ -5,8 +5,9 @@ shows that at once: a controller is told one signal, may fire, and is told the n
 run in which all change together. So the loop has the moments in between: for a signal that is told *late* one place
 says what its controller was told last, by which its gates go, and another one that there is news of it. It is told in a
 firing of its own, sensors in any order and the completion behind them: when a machine says that it is done, what it did
-can be seen, but for a sensor that may linger. Meanwhile the cell may fire and send commands; nothing happens at the
-machines before all is told, since a signal takes less time than a machine.
+can be seen, but for a sensor that may linger. Meanwhile the cell may fire and send commands, and somebody outside may
+press a key or set a signal; nothing happens at the machines before all is told, since a signal takes less time than a
+machine.
 
 A sensor that closes a gate is told late, also where nothing else changes, and completions behind it. What only opens
 gates is told in the instant itself: who fires later for it could have waited. So is a completion with which no sensor
@@ -128,6 +129,10 @@ class Telling:
     def all_told(self) -> Case:
         """No controller is still to be told anything."""
         return Case(tuple((news, False) for news in self.news.values()))
+
+    def is_told(self, signal: str) -> Case:
+        """The controller of a signal is still to be told nothing of it."""
+        return Case(((_news(signal), False),) if signal in self.late else ())
 
     def places(self) -> Iterator[Place]:
         """What controllers were told of signals that are told late, and of which there is news."""

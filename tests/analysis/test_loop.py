@@ -30,7 +30,7 @@ SIZES = {
     "one_robot": (101, 199, 903, 2218),
     "one_robot_mc_late": (100, 197, 2121, 6158),
     "one_robot_mc_late_capacity": (101, 199, 903, 2218),
-    "one_robot_timed": (116, 277, 2527, 7440),
+    "one_robot_timed": (116, 275, 2527, 7617),
     "two_robots_shared": (114, 179, 2007, 5598),
     "two_robots_separate": (114, 179, 2007, 5598),
 }
