@@ -196,8 +196,6 @@ class Plant:
         self.shown = dict.fromkeys(model.sensors, False)
         self.pressed: set[str] = set()
         """The keys that somebody has pressed, and the signals that are set from outside."""
-        self.rounds = {name: 0 for name, sensor in model.sensors.items() if sensor.for_s is not None}
-        """How often each signal that is set from outside again and again has been reset."""
         self.faulted = False
         self.arrival_due = False
         self.is_closed = False
@@ -222,7 +220,8 @@ class Plant:
     def at_rest(self) -> bool:
         """Whether nothing happens any more if no command comes, but that signals are set from outside again."""
         return self.faulted or all(
-            isinstance(event, _Switch) and event.signal in self.rounds for *_, event in self.events
+            isinstance(event, _Switch) and self.model.sensors[event.signal].for_s is not None
+            for *_, event in self.events
         )
 
     @property
@@ -321,10 +320,8 @@ class Plant:
 
     def _switch(self, signal: str, sensor: Sensor) -> None:
         self.pressed ^= {signal}
-        if sensor.for_s is None:
-            return
-        self.rounds[signal] += signal not in self.pressed
-        self._in(sensor.for_s if signal in self.pressed else sensor.after_s, 0.0, _Switch(signal))
+        if sensor.for_s is not None:
+            self._in(sensor.for_s if signal in self.pressed else sensor.after_s, 0.0, _Switch(signal))
 
     def _arrive(self) -> None:
         arrivals = self.model.arrivals

@@ -22,9 +22,9 @@ from collections import Counter
 from collections.abc import Hashable
 from typing import TYPE_CHECKING, Final
 
-from firable.executor.operating import stopping
+from firable.executor.operating import ending, stopping
 from firable.nets.verdict import counted
-from firable.semantics.trace import Event, Fired
+from firable.semantics.trace import Event, Fired, Noted
 
 if TYPE_CHECKING:
     from firable.executor.cell.plant import Plant
@@ -35,7 +35,7 @@ FIRINGS_MAX: Final = 5_000
 ROUNDS_MAX: Final = 300
 """If meanwhile, so many times, all that was under way has come to its end."""
 SWITCHED_MAX: Final = 20
-"""So many times a signal that is set from outside again and again may come and go, and nothing fires any more."""
+"""So many times each signal that is set from outside again and again may come and go, and nothing fires any more."""
 KNOWN_MAX: Final = 100_000
 """So much is remembered of what was there; a circle that is larger is not noticed."""
 _TOLD_MAX: Final = 6
@@ -58,19 +58,28 @@ class Circling:
         """What was to come when the round began."""
         self.rounds = 0
         """How many times since then all that was to come has come."""
-        self.switched = dict(cell.rounds)
-        """How often signals that are set from outside had come and gone at the last firing."""
+        again = [one.after_s + one.for_s for one in cell.model.sensors.values() if one.for_s is not None]
+        self.hope_seconds = SWITCHED_MAX * max(again, default=0.0)
+        """How long what is set from outside again and again is waited for."""
+        self.hoped_from_seconds = run.begin_seconds
+        """When something fired last, or somebody did what is noted: let the run go on after a pause, above all."""
 
     @property
     def is_hoped(self) -> bool:
-        """Whether a signal that is set from outside again and again may still let something fire."""
-        return any(self.cell.rounds[name] - before < SWITCHED_MAX for name, before in self.switched.items())
+        """Whether what is set from outside again and again may still let something fire; where the work is done, or the
+        cycle with which the run is to end, that would be none of it. Nor, at that end, would a lamp that follows it."""
+        run = self.run
+        if run.is_complete() or (run.draining and ending.is_home(run) and not self.cell.inside):
+            return False
+        begun_seconds = self.since_seconds if run.draining and self.again else self.hoped_from_seconds
+        return run.now_seconds() < begun_seconds + self.hope_seconds
 
     def seen(self, event: Event) -> None:
         """Take an event of the trace."""
+        if isinstance(event, Fired | Noted):
+            self.hoped_from_seconds = event.at_seconds
         if not isinstance(event, Fired):
             return
-        self.switched.update(self.cell.rounds)
         through = (self.cell.entered, len(self.cell.delivered))
         if through != self.through or len(self.known) >= KNOWN_MAX:
             self.through = through

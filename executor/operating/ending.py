@@ -106,8 +106,7 @@ def ended(run: Host) -> Situation | None:
     if run.at_rest and run.is_complete() and not (run.paused and run.operated):
         return replace(_reached(run), state=State.DONE, blocked=())
     # With an operator present, a cell at rest is waited for: it may be paused, or be given work.
-    is_hoped = run.circling is not None and run.circling.is_hoped
-    is_stuck = run.at_rest and not is_hoped and not run.operated and not (run.paused and run.served)
+    is_stuck = run.at_rest and not run.operated and not (run.paused and run.served)
     return _reached(run) if is_stuck or run.recorder.is_deadlock else None
 
 

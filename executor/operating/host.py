@@ -197,9 +197,11 @@ class Host:
     def at_rest(self) -> bool:
         """Whether nothing is pending: no message under way, no event in the cell to come, nothing awaited or timed.
 
-        Then time changes nothing; only the operator, by a step or a resume, may let something fire.
+        Then time changes nothing; only the operator, by a step or a resume, may let something fire. Nor is a signal
+        waited for that is set from outside again and again.
         """
-        return self.is_quiet and self.driver.at_rest and not self.dispatch.timers and not self.acts.ticks
+        is_pending = self.dispatch.timers or self.acts.ticks or (self.circling is not None and self.circling.is_hoped)
+        return self.is_quiet and self.driver.at_rest and not is_pending
 
     @property
     def marking(self) -> tuple[str, ...]:

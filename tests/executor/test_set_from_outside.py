@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 import re
 
@@ -14,8 +15,9 @@ from firable.decompose.verification.happenings import Plant as Reading
 from firable.decompose.verification.same_loop import compare
 from firable.executor.cell.plant import Plant, SensorChanged
 from firable.executor.operating.conduct import Conduct, Watch
+from firable.executor.operating.host import Host
 from firable.executor.operating.monitor import Monitor
-from firable.executor.operating.running import RunReport, SimulatedCell, execute
+from firable.executor.operating.running import Operator, RunReport, SimulatedCell, execute
 from firable.executor.operating.situation import State
 from firable.executor.operating.watched_loop import WatchedLoop
 from firable.nets.diagnostics import InputError
@@ -77,9 +79,14 @@ def loop() -> ClosedLoop:
     return close(net(), plant())
 
 
-def ran(text: str = NET, model: PlantModel | None = None, trace: io.StringIO | None = None) -> RunReport:
+def ran(
+    text: str = NET,
+    model: PlantModel | None = None,
+    trace: io.StringIO | None = None,
+    operator: Operator | None = None,
+) -> RunReport:
     cell = SimulatedCell(model or plant(), workpieces=2)
-    return execute(split(parse_net(text)), cell, Conduct(trace=trace, watch=Watch.STOP))
+    return execute(split(parse_net(text)), cell, Conduct(trace=trace, watch=Watch.STOP, operator=operator))
 
 
 def test_whatever_goes_on_such_a_signal_can_change_in_the_loop() -> None:
@@ -182,7 +189,6 @@ def test_a_simulated_run_sets_it_and_resets_it_again_and_again() -> None:
         found += [(cell.now_seconds, value) for value in shown]
     assert found == [(2, True), (3, False), (5, True), (6, False), (8, True)]
     assert cell.at_rest
-    assert cell.rounds["press.key"] == 2
 
 
 def test_without_a_time_it_is_set_at_once_and_for_good() -> None:
@@ -190,7 +196,6 @@ def test_without_a_time_it_is_set_at_once_and_for_good() -> None:
     assert not cell.at_rest
     assert SensorChanged("press.key", value=True) in cell.advance(0.0)
     assert "press.key" not in {event.signal for *_, event in cell.events if hasattr(event, "signal")}
-    assert "press.key" not in cell.rounds
 
 
 def test_a_run_waits_until_both_are_set_and_ends_when_all_workpieces_are_through() -> None:
@@ -209,6 +214,68 @@ def test_a_run_that_nobody_can_help_ends_though_the_key_is_turned_on_and_on() ->
     assert report.state is State.WAITING
     assert 100 < report.simulated_seconds < 400
     assert "press.barred" in str(report.situation.blocked)
+
+
+def test_a_run_is_at_rest_for_its_operator_only_when_nobody_comes_any_more() -> None:
+    stepped: list[tuple[str, float]] = []
+
+    async def operator(host: Host) -> None:
+        host.pause()
+        while len(stepped) < 5:
+            if (name := await host.step()) is not None:
+                stepped.append((name, host.now_seconds()))
+            assert not host.at_rest
+            await asyncio.sleep(0.5)
+        host.resume()
+
+    assert ran(operator=operator).state is State.DONE
+    assert [name for name, _ in stepped] == ["start", "work", "open", "end", "again"]
+    assert 8.0 <= stepped[0][1] < 9.0
+
+
+def test_a_cycle_is_not_at_its_end_while_it_waits_for_a_door_that_will_be_shut() -> None:
+    opening = "{from: press.working, to: press.opening"
+    waiting = NET.replace("[press.key, press.door, press.part]", "press.part").replace(
+        f"{opening}}}", f"{opening}, if: press.door}}"
+    )
+
+    async def operator(host: Host) -> None:
+        await asyncio.sleep(4.5)
+        host.stop(at_end_of_cycle=True)
+
+    report = ran(waiting, operator=operator)
+    assert (report.state, report.situation.marking) == (State.STOPPED, ("press.ready",))
+    assert report.firings["open"] == 1
+    assert report.simulated_seconds < 20
+
+
+def test_a_lamp_that_follows_the_key_puts_off_no_end_of_the_cycle() -> None:
+    lamp = "  lamp: {start: dark, inputs: key, places: {dark: , lit: }}\ntransitions:\n"
+    follows = "  light: {from: lamp.dark, to: lamp.lit, if: lamp.key}\n"
+    follows += "  dim: {from: lamp.lit, to: lamp.dark, unless: lamp.key}\n"
+    with_lamp = (
+        NET.replace("transitions:\n", lamp).replace("press.part]", "press.part], unless: press.barred") + follows
+    )
+    barred = with_lamp.replace("door, part]", "door, part, barred]")
+    model = parse_plant(f"{PLANT}  press.barred: {{set_by: police}}\n  lamp.key: {KEY}\n")
+
+    async def operator(host: Host) -> None:
+        await asyncio.sleep(4.5)
+        host.stop(at_end_of_cycle=True)
+
+    report = ran(barred, model, operator=operator)
+    assert (report.state, report.inside) == (State.STOPPED, (1,))
+    assert report.simulated_seconds < 400
+
+
+def test_a_run_that_was_paused_for_long_waits_anew() -> None:
+    async def operator(host: Host) -> None:
+        host.pause()
+        await asyncio.sleep(300.0)
+        host.resume()
+
+    report = ran(operator=operator)
+    assert (report.state, len(report.delivered)) == (State.DONE, 2)
 
 
 def test_the_monitor_believes_nothing_of_it() -> None:
