@@ -87,6 +87,9 @@ class Plant(Things):
                 ways = {"pressed": partial(self.pressed, name), "released": partial(self.released, name)}
             elif sensor.set_by is not None:
                 ways = {way: partial(self.set_from_outside, name, value=way == "set") for way in ("set", "reset")}
+            flickers = ("drops", "returns") if sensor.may_flicker else ()
+            ways |= {way: partial(self.wavers, name, way) for way in flickers}
+            ways |= {"clears": partial(self.wavers, name, "clears")} if sensor.may_linger else {}
             yield from ((f"{name}/{way}", partial(self.once_it_is_told, name, does)) for way, does in ways.items())
 
     def _in_the_plant(self) -> Iterator[tuple[str, Happens]]:
@@ -109,14 +112,6 @@ class Plant(Things):
             yield f"leaves/{out.station}", partial(self.leaves, out)
         for station in sorted(self.judged):
             yield f"{station}/judged", partial(self.judges, station)
-        for name, sensor in self.model.sensors.items():
-            for way, may in (
-                ("drops", sensor.may_flicker),
-                ("returns", sensor.may_flicker),
-                ("clears", sensor.may_linger),
-            ):
-                if may:
-                    yield f"{name}/{way}", partial(self.wavers, name, way)
 
     def once_all_is_told(self, happens: Happens, state: State) -> Iterator[Changes]:
         """Nothing happens at the machines while a controller is still to be told of what has."""
@@ -124,8 +119,11 @@ class Plant(Things):
             yield from self.is_news(happens, state)
 
     def once_it_is_told(self, name: str, happens: Happens, state: State) -> Iterator[Changes]:
-        """Nobody outside waits until a controller is told of anything but what was done to this very signal before."""
-        if name not in self.late or not state[f"news of {name}"]:
+        """Nobody outside, and no sensor by itself, waits until a controller is told of anything but this very signal.
+
+        What forms a completion is no signal.
+        """
+        if name in self.sensed or name not in self.late or not state[f"news of {name}"]:
             yield from happens(state)
 
     def is_news(self, happens: Happens, state: State) -> Iterator[Changes]:

@@ -348,7 +348,7 @@ class _Closing:
         for name, words, ways in self.telling.moves():
             yield from self.named(name, words, each(calm, ways))
         yield from self.workpieces(start)
-        yield from self.unsteady(start, calm)
+        yield from self.unsteady(calm)
 
     def still_moves(self, name: str, place: Place, start: list[Moment]) -> Iterator[Transition]:
         """What a machine breaks off may be done or end in its accident until it is at rest, unless it has failed."""
@@ -381,9 +381,14 @@ class _Closing:
             judged = each(start, self.laws.judges(station)) if station in self.laws.judged else []
             yield from self.named(f"{station}/judged", f"the workpiece on {station} is judged", judged)
 
-    def unsteady(self, start: list[Moment], calm: list[Moment]) -> Iterator[Transition]:
-        """What a sensor that is not exact does by itself, a key, and what is set from outside."""
+    def unsteady(self, calm: list[Moment]) -> Iterator[Transition]:
+        """What a sensor that is not exact does by itself, a key, and what is set from outside.
+
+        None of them waits until controllers are told of anything else; what changes twice is told twice.
+        """
         for name in self.inexact:
+            told = [self.telling.is_told(name)] if name not in self.acknowledged else [Case()]
+            quiet = each(calm, told)
             sensor, bit, empty = self.model.sensors[name], self.bit(name).name, self.reality(name)
             ways = []
             if sensor.may_flicker:
@@ -391,11 +396,11 @@ class _Closing:
                 ways.append(("returns", True, "shows the workpiece again"))
             for word, value, says in ways:
                 case = Case(((empty, False), (bit, not value)), ((bit, value),))
-                yield from self.named(f"{name}/{word}", f"the sensor of {name} {says}", each(start, [case]))
+                yield from self.named(f"{name}/{word}", f"the sensor of {name} {says}", each(quiet, [case]))
             if sensor.may_linger:
                 case = Case(((empty, True), (bit, True)), ((bit, False),))
                 words = f"the sensor of {name} sees that the workpiece has gone"
-                yield from self.named(f"{name}/clears", words, each(start, [case]))
+                yield from self.named(f"{name}/clears", words, each(quiet, [case]))
 
         for name in self.by_hand:
             sensor, (done, undone) = self.model.sensors[name], self.hand_words(name)
@@ -405,7 +410,6 @@ class _Closing:
             if sensor.acknowledges is not None:
                 # The next command to the machine releases it: so it holds until what waits for it has fired (O4).
                 off = replace(off, wants=((self.laws.idle(sensor.acknowledges), False), *off.wants))
-            # Nobody outside waits until controllers are told of anything else; one who does it twice tells them twice.
             quiet = each(calm, [self.telling.is_told(name)])
             yield from self.named(f"{name}/{done}", f"{name} is {done}{by}", each(quiet, [on]))
             yield from self.named(f"{name}/{undone}", f"{name} is {undone}{by}", each(quiet, [off]))

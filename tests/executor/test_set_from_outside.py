@@ -135,7 +135,7 @@ sensors:
 """
 
 
-@pytest.mark.parametrize("key", ["{set_by: operator}", "{acknowledges: B}"])
+@pytest.mark.parametrize("key", ["{set_by: operator}", "{acknowledges: B}", "{occupied: entry, may_flicker: true}"])
 def test_it_may_change_while_a_controller_is_told_one_thing_after_the_other(key: str) -> None:
     cell, model = parse_net(IN_BETWEEN), parse_plant(CARRIED_ONCE.replace("{set_by: operator}", key))
     found = {verdict.name: verdict.status for verdict in check_loop(cell, model).verdicts}
