@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from firable.analysis.evidence.certificate import (
     Back,
@@ -196,9 +196,7 @@ class _ProgressRecord(Data):
     kind: Literal["progress"]
     set: Natural
     ranks: list[list[Natural]]
-    helpful: list[tuple[list[Natural], str]]
-
-    model_config = ConfigDict(extra="forbid", strict=False, frozen=True)  # not strict: a pair is an array here
+    helpful: list[Annotated[tuple[list[Natural], str], Field(strict=False)]]  # not strict: a pair is an array here
 
     def of(self, net: Net, sets: Sequence[Markings | Diagram]) -> Progress:
         helpful = tuple((tuple(prefix), known(name, net.transition_index)) for prefix, name in self.helpful)

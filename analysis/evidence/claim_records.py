@@ -34,13 +34,11 @@ class Data(BaseModel):
 class ClaimRecord(Data):
     """A claim; what a kind of claim does not speak of is left out."""
 
-    kind: ClaimKind
+    kind: Annotated[ClaimKind, Field(strict=False)]  # not strict: an enumeration is a string here
     goal: str = ""
     then: str = ""
-    fairness: Fairness = Fairness.NONE
+    fairness: Annotated[Fairness, Field(strict=False)] = Fairness.NONE
     fires: list[str] = []
-
-    model_config = ConfigDict(extra="forbid", strict=False, frozen=True)  # not strict: an enumeration is a string here
 
     def of(self, net: Net) -> Claim:
         """The claim, its names looked up."""

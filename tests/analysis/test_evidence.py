@@ -234,6 +234,31 @@ def test_no_edit_of_ranks_shows_the_same(example: Evidence) -> None:
         assert refuses(sealed(data)), edited
 
 
+def _numbers_as_other_things(value: Any) -> Iterator[Any]:
+    """The value with one number in it as a text, a fraction or a truth value, any of which may be taken for it."""
+    match value:
+        case dict():
+            for key, inner in value.items():
+                yield from (value | {key: other} for other in _numbers_as_other_things(inner))
+        case list():
+            for i, inner in enumerate(value):
+                yield from ([*value[:i], other, *value[i + 1 :]] for other in _numbers_as_other_things(inner))
+        case int():
+            yield from (str(value), float(value), bool(value))
+
+
+def test_a_number_is_not_taken_from_what_is_none(example: Evidence) -> None:
+    data = json.loads(text_of(example))
+    shown = data["verdicts"][0]["shown"][0]
+    edits = [(shown, "certificate", edited) for edited in _numbers_as_other_things(shown["certificate"])]
+    edits += [(data, "sets", edited) for edited in _numbers_as_other_things(data["sets"])]
+    for inside, key, edited in random.Random(0).sample(edits, min(30, len(edits))):
+        kept, inside[key] = inside[key], edited
+        with pytest.raises(InputError, match="F6001"):
+            document_from_text(sealed(data))
+        inside[key] = kept
+
+
 def test_a_claim_that_is_shown_twice_is_refused(example: Evidence) -> None:
     data = json.loads(text_of(example))
     verdict = data["verdicts"][0]
