@@ -417,6 +417,24 @@ def test_the_same_conditions_are_met_by_true_claims() -> None:
         assert not refused(evidence)
 
 
+STEPS_IN_ORDER = Labelling(Markings(tuple(CIRCUIT.marking(names) for names in ("ac", "bd"))))
+
+
+@pytest.mark.parametrize(
+    ("of", "claim", "right", "wrong"),
+    [
+        (RACING, ClaimKind.UNORDERED, FiringSequence((("t", "u"),)), FiringSequence((("t", "u"),), (("t",),))),
+        (CIRCUIT, ClaimKind.ORDERED, STEPS_IN_ORDER, replace(STEPS_IN_ORDER, labels=(Whole(),))),
+    ],
+)
+def test_what_nobody_would_look_at_is_refused(
+    of: Net, claim: ClaimKind, right: Certificate, wrong: Certificate
+) -> None:
+    evidence = Evidence(of, Discipline.STEP, Claim(claim), right)
+    assert not refused(evidence)
+    assert refused(replace(evidence, certificate=wrong))
+
+
 def test_two_helpers_in_one_rank_are_refused() -> None:
     evidence = waits(TURNS, Fairness.WEAK, ALL, r0="go")
     assert isinstance(evidence.certificate, Progress)

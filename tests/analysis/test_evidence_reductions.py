@@ -275,6 +275,15 @@ def test_invariants_and_stubborn_sets_show_what_is_left(then: InductiveInvariant
     assert check_evidence(of_rings(replace(LEFT, then=then))).shown
 
 
+def test_what_is_said_of_a_net_that_nothing_is_left_of_is_looked_at() -> None:
+    found = EXAMPLES["reduced to nothing"]()
+    assert found is not None
+    assert isinstance(found.certificate, Reduction)
+    wrong = InductiveInvariant((Equation((), 1),))
+    with pytest.raises(InputError, match="is 0 in the initial marking"):
+        check_evidence(replace(found, certificate=replace(found.certificate, goal=parse_formula("true"), then=wrong)))
+
+
 @pytest.mark.parametrize("name", ["reduction", "reduced to nothing", "reduced to a part"])
 def test_a_reduction_with_a_step_left_out_or_at_another_place_shows_nothing_false(name: str) -> None:
     found = EXAMPLES[name]()

@@ -296,7 +296,7 @@ class _Checker:
             if found if isinstance(found, int) else any(found):
                 refuse(f"the goal ({format_formula(claim.state_goal)}) holds in a marking of the set")
             return Checked(shown=True, method=space.method)
-        if claim.kind is ClaimKind.ORDERED:
+        if claim.kind is ClaimKind.ORDERED and not labels:
             return _ordered(space)
         _require_initially(space, claim, labels)
         return Checked(shown=True, method=f"{space.method}{', and the labels looked through' if labels else ''}")
@@ -346,7 +346,7 @@ def _require_initially(space: Listed | Closed | Diagrams, claim: Claim, labels: 
     """Refuse labels that do not show the claim of M0."""
     formula = as_ctl(claim)
     if formula is None:
-        raise TypeError(f"'{claim}' is no formula of CTL")
+        refuse(f"'{claim}' wants no labels")
     of: LabelledSpace[Any] = space
     if not of.holds_initially(labelled(of, formula, labels)):
         refuse(f"the labels do not say that ({format_temporal(formula)}) holds in the initial marking")
@@ -366,14 +366,14 @@ def _run(evidence: Evidence, of: FiringSequence, deadline: Deadline) -> Checked:
         case ClaimKind.NOT_LEADS_TO:
             check_unanswered_run(net, discipline, claim, of, deadline)
             return Checked(shown=True, method=f"{method}, a run that is fair and has no answer")
+    if of.cycle:
+        refuse("a run into a marking has no cycle")
     if claim.kind is ClaimKind.UNORDERED:
         played(net, discipline, of.firings, deadline)
         last = [net.transition_index[name] for name in of.firings[-1]] if of.firings else []
         if Player(net).serialisable(last):
             refuse("the last step of the run can be replayed one firing after the other")
         return Checked(shown=True, method=f"{method}, the last of which have no order")
-    if of.cycle:
-        refuse("a run into a marking has no cycle")
     markings = played(net, discipline, of.firings, deadline)
     if claim.kind is ClaimKind.REACHABLE:
         if not holds(net, claim.state_goal, markings[-1]):

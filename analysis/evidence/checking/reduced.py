@@ -53,9 +53,9 @@ def left_of(evidence: Evidence, deadline: Deadline) -> Left:
         refuse("the part that is left has a place that was taken out")
     size = f"{len(net.places)}/{len(net.transitions)} to {len(draft.values)}/{len(draft.moves)} places/transitions"
     words = f"{len(of.steps):,} steps of a reduction from {size} gone through"
-    if draft.deadlock and draft.never_dead:
-        return Left((), None, words)
     if of.then is None:
+        if draft.deadlock and draft.never_dead:
+            return Left((), None, words)
         nothing = Obligation("goal", "after the steps of the reduction the goal is false", (draft.goal,))
         return Left((nothing,), None, words)
     small = small_net(draft, places)
