@@ -202,9 +202,10 @@ def test_a_large_set_that_is_closed_is_shown_in_columns(monkeypatch: pytest.Monk
 
 
 def waits(of: Net, fairness: Fairness, ranks: Mapping[str, tuple[int, ...]], **helpful: str) -> Evidence:
-    """Ranks of some of the markings of four places: which of a and b, asked or done."""
-    markings = [of.marking(names) for names in (["a", "asked"], ["b", "asked"], ["a", "done"], ["b", "done"])]
-    of_each = tuple(ranks.get(name, ()) for name in ("a", "b", "c", "d"))
+    """Ranks of the markings with one of the first places, by its letter, and asked; with `done` none has one."""
+    letters = [place.name for place in of.places if len(place.name) == 1]
+    markings = [of.marking((letter, word)) for word in ("asked", "done") for letter in letters]
+    of_each = tuple(ranks.get(letter, ()) for letter in letters) + ((),) * len(letters)
     helping = tuple(((int(key[1:]),), name) for key, name in helpful.items())
     claim = Claim(ClaimKind.LEADS_TO, Holds("asked"), Holds("done"), fairness)
     return Evidence(of, Discipline.INTERLEAVING, claim, Progress(Markings(tuple(markings)), of_each, helping))
@@ -216,10 +217,24 @@ STUCK = Net(
     (*SOMETIMES.places, Place("off")),
     (*SOMETIMES.transitions[:2], Transition("go", ("asked", "off"), ("done",))),
 )
+ROUND = Net(  # `go` is enabled in the first two of four markings, `on` in the others
+    "round",
+    (Place("a", marked=True), *map(Place, "bcd"), Place("asked", marked=True), Place("done")),
+    (
+        *(Transition(f"t{i}", (x,), (y,)) for i, (x, y) in enumerate(zip("abcd", "bcda", strict=True))),
+        Transition("go", ("asked",), ("done",), inhibitive=("c", "d")),
+        Transition("on", ("asked",), ("done",), inhibitive=("a", "b")),
+    ),
+)
 RESPONSES: dict[str, Callable[[], Evidence]] = {
     "what is asked has no rank": lambda: waits(TURNS, Fairness.NONE, {}),
     "nothing helps without fairness": lambda: waits(TURNS, Fairness.NONE, ALL, r0="go"),
     "nobody helps": lambda: waits(TURNS, Fairness.NONE, ALL),
+    "nothing helps all the time": lambda: waits(SOMETIMES, Fairness.WEAK, ALL),
+    "the rank goes up": lambda: waits(SOMETIMES, Fairness.NONE, {"a": (0,), "b": (1,)}),
+    "the rank goes up where somebody helps": lambda: waits(
+        ROUND, Fairness.WEAK, {"a": (0,), "b": (0,), "c": (1,), "d": (1,)}, r0="go", r1="on"
+    ),
     "it is not always enabled": lambda: waits(SOMETIMES, Fairness.WEAK, ALL, r0="now"),
     "the rank goes up and down": lambda: waits(SOMETIMES, Fairness.WEAK, {"a": (0,), "b": (1,)}, r0="tick", r1="now"),
     "who helps fires and stays": lambda: waits(STUCK, Fairness.STRONG, ALL, r0="tick"),
@@ -328,7 +343,8 @@ APART = Net(
         Transition("both", (), (), ("b", "d")),
     ),
 )
-STARTED = net("started", "s", ("s", "a"), ("a", "b"), ("b", "a"))
+# From p one thing goes on at once, and the other one waits; only in the beginning both wait.
+MIXED = net("mixed", "ac", ("p", "ay"), ("p", "cx"), ("a", "x"), ("c", "y"), ("xy", "p"))
 GATED = Net(
     "gated",
     (Place("a", marked=True), Place("b"), Place("g", marked=True)),
@@ -354,7 +370,7 @@ def theorem(
 
 HOME_AGAIN = Claim(ClaimKind.ALWAYS_POSSIBLE, Start())
 NO_TOKEN = InductiveInvariant(clauses=(Clause(empty=("a",)), Clause(empty=("b",))))
-THREE = InductiveInvariant((Equation((("s", 1), ("a", 1), ("b", 1)), 1),))
+EACH_ONCE = InductiveInvariant(tuple(Equation(tuple((name, 1) for name in names), 1) for names in ("apx", "cpy")))
 THEOREMS: dict[str, Callable[[], Evidence]] = {
     "a circuit without a token": lambda: theorem(UNMARKED, TheoremName.MARKED_GRAPH, NO_TOKEN),
     "no marked graph": lambda: theorem(HALF_LIVE, TheoremName.MARKED_GRAPH, ONE_TOKEN),
@@ -362,7 +378,7 @@ THEOREMS: dict[str, Callable[[], Evidence]] = {
     "no traps at all": lambda: theorem(HALF_LIVE, TheoremName.FREE_CHOICE, ONE_TOKEN),
     "a trap that is none": lambda: theorem(HALF_LIVE, TheoremName.FREE_CHOICE, ONE_TOKEN, "ab"),
     "a trap without a token": lambda: theorem(UNMARKED, TheoremName.FREE_CHOICE, NO_TOKEN, "ab"),
-    "an empty trap": lambda: theorem(STARTED, TheoremName.FREE_CHOICE, THREE, "abs", claim=HOME_AGAIN),
+    "an empty trap": lambda: theorem(MIXED, TheoremName.FREE_CHOICE, EACH_ONCE, "apx", "cpy", claim=HOME_AGAIN),
     "not free choice": lambda: theorem(APART, TheoremName.FREE_CHOICE, NO_CONTACT, "ab", "cd"),
     "not asymmetric choice": lambda: theorem(APART, TheoremName.ASYMMETRIC_CHOICE, NO_CONTACT, "ab", "cd"),
     "a transition that puts what it takes": lambda: theorem(DRAWN, TheoremName.FREE_CHOICE, ONE_OF_TWO, "ab"),

@@ -80,7 +80,7 @@ class _Waiting:
             t = self.helpful.get(before[: k + 1])
             if t is None or t in fired:
                 return False
-            if self.fairness is Fairness.WEAK or t in self.enabled[i] or t in self.enabled[after]:
+            if t in self.enabled[i] or t in self.enabled[after]:
                 return True
         return False
 
