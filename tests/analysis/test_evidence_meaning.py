@@ -29,8 +29,9 @@ from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.report import report_on
 from firable.nets.catalogue import catalogue_net
 from firable.nets.diagnostics import InputError
-from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Start
-from firable.nets.net import Command, Net, Place, Property, PropertyKind, Transition
+from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Or, Start, parse_formula
+from firable.nets.net import Command, ExternalGate, Net, Place, Property, PropertyKind, Signal, Transition
+from firable.nets.queries import Query, QueryKind
 from firable.nets.temporal import parse_temporal
 from firable.nets.verdict import Status
 from firable.semantics.trace import Discipline
@@ -203,6 +204,37 @@ def test_only_runs_from_the_start_or_from_home_show_that_a_transition_fires() ->
     assert enough(fires(TRUE, *every))
     assert not enough(fires(Start(), *every))
     assert enough(fires(Start(), *every), Claim(ClaimKind.ALWAYS_POSSIBLE, Start()))
+
+
+def test_a_transition_that_never_opens_is_in_contact_and_puts_no_second_token() -> None:
+    never = (ExternalGate("s"), ExternalGate("s", wanted=False))
+    places = (Place("a", marked=True), Place("b", marked=True))
+    of = Net("shut", places, (Transition("t", ("a",), ("b",), external=never),), (Signal("s"),))
+    met, query = Claim(ClaimKind.REACHABLE, parse_formula("a and b")), Query("q", QueryKind.ONE_SAFE)
+
+    def enough(name: str, proved: bool, *claims: Claim) -> bool:
+        return suffices(of, Discipline.INTERLEAVING, name, proved, claims, query)
+
+    assert enough("contact-free", False, met)
+    assert not enough("contact-free", True)
+    assert enough("query.q", True)
+    assert not enough("query.q", False, met)
+
+
+@pytest.mark.parametrize("moves", [("ax", "ay", "az"), ("xa", "ya", "za")])
+def test_too_many_pairs_to_list_are_shown_by_no_claim(moves: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    of = net("many", "", *((move[0], move[1]) for move in moves))
+
+    def enough() -> bool:
+        goal = tidy(Or(tuple(And((Firable(f"t{i}"), Firable(f"t{k}"))) for i, k in pairs)))
+        claims = [Claim(ClaimKind.NEVER, goal)]
+        return suffices(of, Discipline.INTERLEAVING, "effective-conflicts", True, claims, None)
+
+    pairs = [(0, 1), (0, 2), (1, 2)]
+    assert enough()
+    monkeypatch.setattr("firable.semantics.conflict.PAIRS_MAX", 2)
+    pairs = pairs[:2]
+    assert not enough()
 
 
 def test_what_needs_nothing_to_show_it_stands_in_no_record() -> None:
