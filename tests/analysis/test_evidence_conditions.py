@@ -287,6 +287,8 @@ RUNS: dict[str, Callable[[], Evidence]] = {
     "the cycle does not close": lambda: run(ENDING, refuted("F b"), "", "end"),
     "the run could go on": lambda: run(ENDING, refuted("F b"), ""),
     "the run satisfies it": lambda: run(LOOP, refuted("X b"), "", "t0 t1"),
+    "until it ends it does not hold": lambda: run(LOOP, refuted("not (z U b)"), "", "t0 t1"),
+    "it never ends": lambda: run(LOOP, refuted("not (a or b) U z or G (a or b)"), "", "t0 t1"),
     "after the cycle comes its first": lambda: run(LOOP, refuted("X X a"), "", "t0 t1"),
     "the answer comes in the cycle": lambda: unanswered(TURNS, Fairness.STRONG, "", "go again"),
     "the answer comes before it is asked again": lambda: unanswered(TURNS, Fairness.WEAK, "go", "tick again tock go"),
@@ -300,6 +302,16 @@ RUNS: dict[str, Callable[[], Evidence]] = {
     "it fires in another order": lambda: run(HALF_LIVE, in_order(Start(), "t2", "t0"), "t0 t1 t2"),
     "it fires in order before the goal": lambda: run(ENDING, in_order(Holds("b"), "end"), "end"),
     "it fires once": lambda: run(ENDING, in_order(Start(), "end", "end"), "end"),
+    "two fire at once": lambda: Evidence(
+        RACING,
+        Discipline.INTERLEAVING,
+        Claim(ClaimKind.REACHABLE, parse_formula("not a and not b")),
+        FiringSequence((("t", "u"),)),
+    ),
+    "it is never opened": lambda: run(SHUT, Claim(ClaimKind.REACHABLE, Holds("b")), "t0"),
+    "a step leaves out what fires with it": lambda: run(
+        CIRCUIT, Claim(ClaimKind.REACHABLE, parse_formula("a and d")), "go one", discipline=Discipline.STEP
+    ),
     "one step has no order": lambda: Evidence(
         RACING, Discipline.STEP, in_order(Start(), "t", "u"), FiringSequence((("t", "u"),))
     ),
@@ -440,6 +452,7 @@ STEPS_IN_ORDER = Labelling(Markings(tuple(CIRCUIT.marking(names) for names in ("
     ("of", "claim", "right", "wrong"),
     [
         (RACING, ClaimKind.UNORDERED, FiringSequence((("t", "u"),)), FiringSequence((("t", "u"),), (("t",),))),
+        (RACING, ClaimKind.UNORDERED, FiringSequence((("t", "u"),)), FiringSequence((("t", "u", "u"),))),
         (CIRCUIT, ClaimKind.ORDERED, STEPS_IN_ORDER, replace(STEPS_IN_ORDER, labels=(Whole(),))),
     ],
 )
@@ -449,6 +462,20 @@ def test_what_nobody_would_look_at_is_refused(
     evidence = Evidence(of, Discipline.STEP, Claim(claim), right)
     assert not refused(evidence)
     assert refused(replace(evidence, certificate=wrong))
+
+
+@pytest.mark.parametrize(
+    ("kind", "goal", "certificate"),
+    [
+        (ClaimKind.NOT_LTL, "G not {}", FiringSequence((), (("go",), ("one", "two")))),
+        (ClaimKind.LTL, "F {}", Unfolded(Markings(tuple(CIRCUIT.marking(names) for names in ("ac", "bd"))))),
+    ],
+)
+def test_of_steps_nothing_is_said_of_one_firing(kind: ClaimKind, goal: str, certificate: Certificate) -> None:
+    said, unsaid = (Claim(kind, parse_temporal(goal.format(atom))) for atom in ("b", "fires(one)"))
+    assert not refused(Evidence(CIRCUIT, Discipline.STEP, said, certificate))
+    with pytest.raises(InputError, match="a step holds several"):
+        check_evidence(Evidence(CIRCUIT, Discipline.STEP, unsaid, certificate))
 
 
 def test_two_helpers_in_one_rank_are_refused() -> None:
