@@ -57,6 +57,7 @@ from firable.nets.temporal import parse_temporal
 from firable.semantics.trace import Discipline
 
 FORK = net("fork", "a", ("a", "b"), ("a", "c"))
+BACKWARDS = net("backwards", "b", ("b", "a"))
 HALF_LIVE = net("half", "a", ("a", "b"), ("b", "a"), ("a", "c"))
 
 
@@ -83,7 +84,8 @@ def never(of: Net, goal: str, space: Markings | Diagram) -> Evidence:
 
 
 LABELS: dict[str, Callable[[], Evidence]] = {
-    "M0 is left out": lambda: never(LOOP, "a", Markings((LOOP.marking("b"),))),
+    "M0 is left out": lambda: never(ENDING, "a", Markings((ENDING.marking("b"),))),
+    "M0 is left out after all others": lambda: never(BACKWARDS, "b", Markings((BACKWARDS.marking("a"),))),
     "a firing leads out": lambda: never(LOOP, "b", Markings((LOOP.marking("a"),))),
     "the goal is inside": lambda: never(LOOP, "b", Markings((1, 2))),
     "nearer is what has no rank": lambda: listed(LOOP, "EF z", ["a", "b"], 1, -1),
@@ -283,6 +285,13 @@ def unanswered(of: Net, fairness: Fairness, firings: str, cycle: str = "") -> Ev
     return run(of, Claim(ClaimKind.NOT_LEADS_TO, Holds("asked"), Holds("done"), fairness), firings, cycle)
 
 
+_BOTH = (ExternalGate("s", wanted=True), ExternalGate("s", wanted=False))
+SHUT = Net(
+    "shut",
+    (Place("a", marked=True), Place("b")),
+    (Transition("t0", ("a",), ("b",), external=_BOTH), Transition("t1", ("b",), ("a",))),
+    (Signal("s"),),
+)
 RUNS: dict[str, Callable[[], Evidence]] = {
     "the cycle does not close": lambda: run(ENDING, refuted("F b"), "", "end"),
     "the run could go on": lambda: run(ENDING, refuted("F b"), ""),
@@ -361,13 +370,6 @@ GATED = Net(
     "gated",
     (Place("a", marked=True), Place("b"), Place("g", marked=True)),
     (Transition("t0", ("a",), ("b",), inhibitive=("g",)), Transition("t1", ("b",), ("a",))),
-)
-_BOTH = (ExternalGate("s", wanted=True), ExternalGate("s", wanted=False))
-SHUT = Net(
-    "shut",
-    (Place("a", marked=True), Place("b")),
-    (Transition("t0", ("a",), ("b",), external=_BOTH), Transition("t1", ("b",), ("a",))),
-    (Signal("s"),),
 )
 ONE_OF_TWO = InductiveInvariant((Equation((("a", 1), ("b", 1)), 1),))
 NO_CONTACT = InductiveInvariant((Equation((("a", 1), ("b", 1)), 1), Equation((("c", 1), ("d", 1)), 1)))

@@ -50,7 +50,7 @@ class _Waiting:
         self.asked, self.answered = space.where(claim.state_goal), space.where(claim.then)
         self.helpful = {prefix: space.net.transition_index[name] for prefix, name in of.helpful}
         self.enabled = [frozenset(t for fired, _ in firings for t in fired) for firings in space.edges]
-        if len(self.helpful) != len(of.helpful) or list(self.helpful) != sorted(self.helpful):
+        if [prefix for prefix, _ in of.helpful] != sorted(self.helpful):
             refuse("the ranks that a transition helps are not in order")
 
     def check(self) -> None:
@@ -95,7 +95,7 @@ class _Waiting:
                 if (k + 1 < len(rank)) is not self._goes_on(i, rank[: k + 1]):
                     refuse(f"the rank of {self._shown(i)} is longer or shorter than it has to be")
         for rank in members:
-            if rank[-1] < 0 or (rank[-1] > 0 and (*rank[:-1], rank[-1] - 1) not in members):
+            if rank[-1] and (*rank[:-1], rank[-1] - 1) not in members:
                 refuse(f"there is a gap in the ranks before {', '.join(map(str, rank))}")
         for rank in self.helpful.keys() | members.keys():
             if self.helpful.get(rank) != self._first_that_helps(rank, members.get(rank, [])):
