@@ -3,9 +3,10 @@
 import random
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import pytest
-from support.evidence_examples import LOOP, fires, in_order, net
+from support.evidence_examples import LOOP, RACING, fires, in_order, net
 from support.lively_nets import lively_net
 from support.naive_space import NaiveSpace
 from support.true_claims import true
@@ -31,7 +32,7 @@ from firable.nets.catalogue import catalogue_net
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Or, Start, parse_formula
 from firable.nets.net import Command, ExternalGate, Net, Place, Property, PropertyKind, Signal, Transition
-from firable.nets.queries import Query, QueryKind
+from firable.nets.queries import Query, QueryKind, query_named
 from firable.nets.temporal import parse_temporal
 from firable.nets.verdict import Status
 from firable.semantics.trace import Discipline
@@ -77,6 +78,11 @@ def test_what_is_met_from_a_home_marking_is_always_possible_and_from_another_it_
         ("starvation", True, []),
         ("contact-free", True, [Claim(ClaimKind.NEVER, And((Holds("a"), Holds("z"))))]),
         ("effective-conflicts", False, [Claim(ClaimKind.REACHABLE, And((Firable("t0"), Firable("t1"))))]),
+        (
+            "effective-conflicts",
+            False,
+            [Claim(ClaimKind.REACHABLE, And((Firable("t0"), Firable("t0"))))],
+        ),  # one of them
         ("query.q", True, [FIRES_ALL]),
         ("nonsense", True, [FIRES_ALL]),
     ],
@@ -84,6 +90,60 @@ def test_what_is_met_from_a_home_marking_is_always_possible_and_from_another_it_
 def test_claims_that_say_less_do_not_suffice(name: str, proved: bool, claims: list[Claim]) -> None:
     of = net("less", "ab", ("a", "c"), ("b", "d"), ("c", "a"))
     assert not suffices(of, Discipline.INTERLEAVING, name, proved, claims, None)
+
+
+def reachable(*goals: str) -> list[Claim]:
+    return [Claim(ClaimKind.REACHABLE, parse_formula(goal)) for goal in goals]
+
+
+def never(*goals: str) -> list[Claim]:
+    return [Claim(ClaimKind.NEVER, parse_formula(goal)) for goal in goals]
+
+
+def of_formula(kind: ClaimKind, text: str) -> Claim:
+    return Claim(kind, parse_temporal(text))
+
+
+HERE = net("here", "a", ("a", "b"), ("b", "a"), ("a", "a"))  # t2 puts what it takes, and never fires
+QUERIES = {  # what suffices for a query, and what does not
+    ("AG EF a", True): ([of_formula(ClaimKind.CTL, "AG EF a")], [of_formula(ClaimKind.CTL, "EF a"), *reachable("a")]),
+    ("AG EF z", False): ([of_formula(ClaimKind.CTL, "not AG EF z")], [of_formula(ClaimKind.LTL, "G F z"), *never("z")]),
+    ("ltl G F a", True): ([of_formula(ClaimKind.LTL, "G F a")], [of_formula(ClaimKind.CTL, "AG AF a")]),
+    ("ltl G F a", False): ([of_formula(ClaimKind.NOT_LTL, "G F a")], [of_formula(ClaimKind.CTL, "EF AG not a")]),
+    ("live", True): ([Claim(ClaimKind.LIVE)], [fires(TRUE, "t0", "t1", "t2"), *reachable("firable(t0)")]),
+    ("live", False): (never("firable(t2)"), never("a and b")),
+    ("quasi_live", True): ([fires(TRUE, "t0", "t1", "t2")], [fires(TRUE, "t0", "t1")]),
+    ("quasi_live", False): (never("firable(t2)"), [Claim(ClaimKind.LOST, Firable("t2"))]),
+    ("stable_marking", True): (never("z"), reachable("z")),
+    ("stable_marking", False): (
+        reachable("a", "not a", "b", "not b", "z", "not z"),
+        reachable("a", "not a", "b", "not b", "not z"),
+    ),
+    ("bound tokens(a, b)", True): (
+        [*reachable("tokens(a, b) >= 1"), *never("tokens(a, b) >= 2")],
+        [*reachable("tokens(a, b) >= 1", "a"), *never("tokens(a, b, b) >= 2")],
+    ),
+    ("bound tokens(a, z)", True): (reachable("tokens(a, z) >= 2"), never("tokens(a, z) >= 2")),
+    ("bound tokens(a)", True): (reachable("tokens(a) >= 1"), []),
+    ("bound tokens(z)", True): (never("tokens(z) >= 1"), []),
+}
+
+
+@pytest.mark.parametrize(("text", "proved"), QUERIES)
+def test_a_query_is_answered_by_claims_that_say_so_and_by_no_less(text: str, proved: bool) -> None:
+    enough, less = QUERIES[text, proved]
+    query = query_named(text, HERE, "q")
+    asked = partial(suffices, HERE, Discipline.INTERLEAVING, "query.q", query=query)
+    assert asked(proved=proved, claims=enough)
+    assert not asked(proved=proved, claims=less)
+    assert not asked(proved=not proved, claims=enough)
+
+
+def test_whether_a_net_with_loops_is_safe_as_an_ordinary_one_is_shown_by_no_claim() -> None:
+    query, loops = Query("q", QueryKind.ONE_SAFE), replace(HERE, transitions=HERE.transitions[2:])
+    free = Claim(ClaimKind.NEVER, contact(loops, openable=True))
+    for of, enough in ((replace(loops, transitions=()), True), (loops, False)):
+        assert suffices(of, Discipline.INTERLEAVING, "query.q", True, [free], query) is enough
 
 
 def test_a_home_marking_is_the_formula_of_all_places() -> None:
@@ -133,6 +193,8 @@ def test_of_single_firings_nobody_asks_whether_their_steps_have_an_order() -> No
     ordered = [Claim(ClaimKind.ORDERED)]
     assert suffices(LOOP, Discipline.STEP, "steps-serialisable", proved=True, claims=ordered, query=None)
     assert not suffices(LOOP, Discipline.INTERLEAVING, "steps-serialisable", proved=True, claims=ordered, query=None)
+    for of, read_off in ((LOOP, True), (RACING, False)):
+        assert suffices(of, Discipline.STEP, "steps-serialisable", proved=True, claims=[], query=None) is read_off
 
 
 def test_starvation_is_excluded_by_all_that_wait() -> None:
@@ -144,6 +206,21 @@ def test_starvation_is_excluded_by_all_that_wait() -> None:
 
     assert enough("t2", "t3")
     assert not enough("t2")
+
+
+def test_where_no_valuation_opens_two_ways_at_once_they_do_not_compete_and_nothing_is_said_of_starvation() -> None:
+    def ways(*wanted: bool) -> Net:
+        gated = (
+            Transition(f"t{i}", ("a",), ("b",), external=(ExternalGate("s", one),)) for i, one in enumerate(wanted)
+        )
+        back = Transition("back", ("b",), ("a",))
+        return Net("ways", (Place("a", marked=True), Place("b")), (*gated, back), (Signal("s"),))
+
+    both = Claim(ClaimKind.REACHABLE, And((Firable("t0"), Firable("t1"))))
+    live = Claim(ClaimKind.ALWAYS_POSSIBLE, Firable("t1"))
+    for of, together in ((ways(True, True), True), (ways(True, False), False)):
+        for name, claim in (("effective-conflicts", both), ("starvation", live)):
+            assert suffices(of, Discipline.INTERLEAVING, name, False, [claim], None) is together, name
 
 
 def _commanded(draw: random.Random) -> Net:

@@ -225,6 +225,10 @@ FALSE: dict[str, Callable[[], Evidence]] = {
     "the part does not ask for what the net does": lambda: of_rings(LEFT, "a and c"),
     "the goal of the part is wrong": lambda: of_rings(replace(LEFT, goal=parse_formula("not c and not d")), "a and c"),
     "the goal is not false": lambda: of_rings(Reduction(()), "a"),
+    "there is a deadlock": lambda: of_rings(Reduction(()), "deadlock", net_of("a", "t: a -> b")),
+    "something always fires, and a deadlock is not asked for": lambda: of_rings(
+        Reduction(steps("always 0")), "b", net_of("a", "t: -> ", "u: a -> b")
+    ),
     "the part is not apart": lambda: of_rings(
         replace(LEFT, part=("c",), goal=parse_formula("not c"), then=Labelling(Markings((1,)))), "not c"
     ),
@@ -240,6 +244,9 @@ FALSE: dict[str, Callable[[], Evidence]] = {
     "the markings are of a larger net": lambda: of_rings(replace(LEFT, then=Labelling(Markings((0b01, 0b10, 0b100))))),
     "the goal speaks of places of the net": lambda: of_rings(replace(LEFT, goal=parse_formula("a"))),
     "the goal speaks of transitions of the net": lambda: of_rings(replace(LEFT, goal=Firable("t"))),
+    "the sets are of a goal that speaks of transitions of the net": lambda: of_rings(
+        Reduction((), ("c", "d"), Firable("t"), StubbornSets(Markings((0b01, 0b10)), (0b11,), (0, 0)))
+    ),
     "the sums speak of places of the net": lambda: of_rings(
         replace(LEFT, then=InductiveInvariant((*SUM.equations, Equation((("a", 1), ("b", 1)), 1))))
     ),
