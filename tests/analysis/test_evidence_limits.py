@@ -115,6 +115,12 @@ def test_a_document_says_one_thing_of_each_verdict(records: list[Record], reason
     assert [found.code for found in caught.value.diagnostics] == ["F6001"]
 
 
+def test_what_a_document_says_to_be_lacking_is_not_shown() -> None:
+    records = (Record("self-loops", True, ()), Record("structural-conflicts", True, (), lacking="no time"))
+    checked = check_document(Document(LOOP, Discipline.INTERLEAVING, records))
+    assert [(one.shown, one.only_claimed) for one in checked] == [(True, ""), (False, "only claimed: no time")]
+
+
 def test_a_claim_that_stood_before_names_its_certificate_and_one_that_did_not_is_refused() -> None:
     found = EXAMPLES["markings"]()
     assert found is not None
@@ -134,6 +140,18 @@ def test_a_claim_that_stood_before_names_its_certificate_and_one_that_did_not_is
     data["verdicts"].reverse()
     with pytest.raises(InputError, match="no verdict before has"):
         document_from_text(json.dumps({**data, "seal": seal(data)}))
+
+
+def test_another_certificate_of_a_claim_that_was_shown_is_looked_at() -> None:
+    found = EXAMPLES["traps"]()
+    assert found is not None
+    assert isinstance(found.certificate, InductiveInvariant)
+    wrong = replace(found.certificate, clauses=())
+    records = tuple(Record("", True, ((found.claim, one),)) for one in (found.certificate, wrong))
+    checked = check_document(Document(found.net, found.discipline, records))
+    assert next(checked).shown
+    with pytest.raises(InputError, match="F6002"):
+        next(checked)
 
 
 def test_claims_of_no_verdict_may_stand_beside_each_other() -> None:
