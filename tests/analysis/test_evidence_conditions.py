@@ -44,7 +44,7 @@ from firable.analysis.evidence.certificate import (
     Unfolded,
     Whole,
 )
-from firable.analysis.evidence.checking.checker import check_evidence
+from firable.analysis.evidence.checking.checker import check_document, check_evidence
 from firable.analysis.evidence.checking.nodes import EMPTY, UNIT, Nodes
 from firable.analysis.evidence.checking.obligation import Evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind
@@ -139,6 +139,34 @@ def test_a_large_set_is_in_order_each_marking_once(markings: tuple[int, ...], mo
     monkeypatch.setattr("firable.analysis.evidence.checking.checker.EDGES_MAX", 0)
     with pytest.raises(InputError, match="not in order, each once"):
         check_evidence(never(LOOP, "a and b", Markings(markings)))
+
+
+@pytest.mark.parametrize(
+    ("space", "reason"),
+    [
+        (Markings((1, 2, 3)), "leads out of the set"),
+        (Diagram(("a", "b"), ((1, 0, 1), (1, 1, 1), (2, 2, 3)), (4,)), "under interleaving only"),
+    ],
+)
+def test_a_large_set_shows_nothing_of_steps_that_lead_out_of_it(
+    space: Markings | Diagram, reason: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("firable.analysis.evidence.checking.checker.EDGES_MAX", 0)
+    evidence = never(RACING, "not a and not b", space)
+    assert check_evidence(evidence).shown
+    with pytest.raises(InputError, match=reason):
+        check_evidence(replace(evidence, discipline=Discipline.STEP))
+
+
+def test_a_set_that_shows_what_is_after_a_run_is_looked_at_again_for_what_is_before_it() -> None:
+    space = Labelling(Markings((ENDING.marking("b"),)))
+    after = Evidence(
+        ENDING, Discipline.INTERLEAVING, Claim(ClaimKind.LOST, Holds("a")), Continuation((("end",),), space)
+    )
+    before = replace(after, claim=Claim(ClaimKind.NEVER, Holds("a")), certificate=space)
+    assert check_evidence(after).shown
+    with pytest.raises(InputError, match="the initial marking is not in the set"):
+        list(check_document(document(after, before)))
 
 
 class Same:

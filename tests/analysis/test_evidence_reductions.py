@@ -277,6 +277,15 @@ def test_a_set_that_two_nets_without_transitions_share_is_looked_at_for_each() -
         list(check_document(document(first, second)))
 
 
+def test_a_set_that_two_nets_of_the_same_places_share_is_looked_at_for_each() -> None:
+    net, part, space = net_of("a", "t: a -> b", "u: c -> d"), ("a", "b", "c", "d"), Labelling(Markings((0b0001,)))
+    true_without_t = of_rings(Reduction(steps("irrelevant 0"), part, parse_formula("d"), space), "d", net)
+    false_with_it = of_rings(Reduction((), part, parse_formula("b"), space), "b", net)
+    assert check_evidence(true_without_t).shown
+    with pytest.raises(InputError, match="leads out of the set"):
+        list(check_document(document(true_without_t, false_with_it)))
+
+
 @pytest.mark.parametrize("then", [SUM, StubbornSets(Markings((0b01, 0b10)), (0b11,), (0, 0))])
 def test_invariants_and_stubborn_sets_show_what_is_left(then: InductiveInvariant | StubbornSets) -> None:
     assert check_evidence(of_rings(replace(LEFT, then=then))).shown
