@@ -85,6 +85,9 @@ def test_where_more_traps_would_be_listed_than_are_the_theorem_is_shown_by_ranks
         net_of("a", "t: a -> b", "u: a -> c", "v: b -> a"),  # c is a siphon's end: a and b run empty
         net_of("", "t: a -> b", "u: b -> a"),  # nothing is marked
         net_of("a", "t: a -> b if a", "u: b -> c"),  # what is read is taken too
+        net_of(
+            "a c", "t: a -> b if c", "u: a, c -> b", "v: b -> a"
+        ),  # who reads c puts it back, and who takes it does not
         # One after the other is emptied, which wants as many numbers as there are places.
         net_of("a", "t: a -> b", "u: b -> c", "v: c -> d", "w: d -> a", "x: d -> "),
     ],
