@@ -402,6 +402,7 @@ GATED = Net(
     (Place("a", marked=True), Place("b"), Place("g", marked=True)),
     (Transition("t0", ("a",), ("b",), inhibitive=("g",)), Transition("t1", ("b",), ("a",))),
 )
+READ = Net("read", SHUT.places, (Transition("t0", ("a",), ("b",), ("a",)),))
 ONE_OF_TWO = InductiveInvariant((Equation((("a", 1), ("b", 1)), 1),))
 NO_CONTACT = InductiveInvariant((Equation((("a", 1), ("b", 1)), 1), Equation((("c", 1), ("d", 1)), 1)))
 
@@ -418,10 +419,12 @@ NO_TOKEN = InductiveInvariant(clauses=(Clause(empty=("a",)), Clause(empty=("b",)
 EACH_ONCE = InductiveInvariant(tuple(Equation(tuple((name, 1) for name in names), 1) for names in ("apx", "cpy")))
 THEOREMS: dict[str, Callable[[], Evidence]] = {
     "a circuit without a token": lambda: theorem(UNMARKED, TheoremName.MARKED_GRAPH, NO_TOKEN),
+    "a marked graph with an end": lambda: theorem(ENDING, TheoremName.MARKED_GRAPH, ONE_OF_TWO),
     "no marked graph": lambda: theorem(HALF_LIVE, TheoremName.MARKED_GRAPH, ONE_TOKEN),
     "no trap in a siphon": lambda: theorem(HALF_LIVE, TheoremName.FREE_CHOICE, ONE_TOKEN, "abc"),
     "no traps at all": lambda: theorem(HALF_LIVE, TheoremName.FREE_CHOICE, ONE_TOKEN),
     "a trap that is none": lambda: theorem(HALF_LIVE, TheoremName.FREE_CHOICE, ONE_TOKEN, "ab"),
+    "a trap of what is read and taken": lambda: theorem(READ, TheoremName.FREE_CHOICE, ONE_OF_TWO, "a"),
     "a trap without a token": lambda: theorem(UNMARKED, TheoremName.FREE_CHOICE, NO_TOKEN, "ab"),
     "an empty trap": lambda: theorem(MIXED, TheoremName.FREE_CHOICE, EACH_ONCE, "apx", "cpy", claim=HOME_AGAIN),
     "not free choice": lambda: theorem(APART, TheoremName.FREE_CHOICE, NO_CONTACT, "ab", "cd"),

@@ -1,0 +1,109 @@
+"""A document of evidence that is sealed anew is refused where it has another shape, or names what is none."""
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from support.evidence import document
+from support.evidence_examples import EXAMPLES
+
+from firable.analysis.evidence.document import document_from_text, seal
+from firable.nets.diagnostics import InputError
+
+Change = Callable[[dict[str, Any]], object]
+
+
+def of_claim(**changed: Any) -> Change:
+    return lambda data: data["verdicts"][0]["shown"][0]["claim"].update(changed)
+
+
+def of_certificate(**changed: Any) -> Change:
+    return lambda data: data["verdicts"][0]["shown"][0]["certificate"].update(changed)
+
+
+def of_set(**changed: Any) -> Change:
+    return lambda data: data["sets"][0].update(changed)
+
+
+SUM = {"weights": {"nowhere": 1}, "tokens": 0}
+STEP = {"rule": "copy", "moves": [], "places": ["nowhere", "nowhere"]}
+DIAGRAM = {"kind": "diagram", "order": ["a", "b", "asked", "done"], "rows": [], "roots": [1]}
+CHANGES: dict[str, tuple[str, Change, str]] = {
+    "a place of a goal": ("weak", of_claim(goal="nowhere"), "no 'nowhere'"),
+    "a place of an answer": ("weak", of_claim(then="nowhere"), "no 'nowhere'"),
+    "a transition of a goal": ("unfolded", of_claim(goal="G not fires(nobody)"), "no 'nobody'"),
+    "a transition that fires": ("fires", of_claim(fires=["nobody"]), "no 'nobody'"),
+    "a formula of CTL for one of LTL": ("unfolded", of_claim(goal="AG EF done"), "is no formula of LTL"),
+    "a formula of LTL for one of CTL": ("labels", of_claim(goal="G F deadlock"), "is no formula of CTL"),
+    "a formula for a goal": ("markings", of_claim(goal="AG deadlock"), "a formula cannot be read"),
+    "a place of a sum": ("invariant", of_certificate(equations=[SUM]), "no 'nowhere'"),
+    "a place of a lower bound": ("invariant", of_certificate(inequalities=[SUM]), "no 'nowhere'"),
+    "a place of a clause": (
+        "invariant",
+        of_certificate(clauses=[{"marked": ["nowhere"], "empty": []}]),
+        "no 'nowhere'",
+    ),
+    "a place of no clause": (
+        "invariant",
+        of_certificate(clauses=[{"marked": [], "empty": ["nowhere"]}]),
+        "no 'nowhere'",
+    ),
+    "a place of a trap": ("free choice", of_certificate(traps=[["nowhere"]]), "no 'nowhere'"),
+    "a place of a part": ("reduction", of_certificate(part=["nowhere"]), "no 'nowhere'"),
+    "a place of a step": ("reduction", of_certificate(steps=[STEP]), "no 'nowhere'"),
+    "a place of a diagram": ("diagram", of_set(order=["nowhere"]), "no 'nowhere'"),
+    "a rule": ("reduction", of_certificate(steps=[{**STEP, "rule": "guess"}]), "guess"),
+    "who fires": ("sequence", of_certificate(firings=[["nobody"]]), "no 'nobody'"),
+    "who fires again and again": ("lasso", of_certificate(cycle=[["nobody"]]), "no 'nobody'"),
+    "who helps": ("weak", of_certificate(helpful=[[[0], "nobody"]]), "no 'nobody'"),
+    "who is gone back by": (
+        "rounds",
+        of_certificate(labels=[{"kind": "back", "transitions": ["nobody"]}]),
+        "no 'nobody'",
+    ),
+    "who is stubborn": (
+        "stubborn sets",
+        of_certificate(stubborn=["1" + "0" * 40]),
+        "a transition that the net does not",
+    ),
+    "a set": ("markings", of_certificate(set=1), "no set 1"),
+    "a set of stubborn sets": ("stubborn sets", of_certificate(set=1), "no set 1"),
+    "a listed set of ranks": ("weak", lambda data: data["sets"].__setitem__(0, DIAGRAM), "set 0 is not listed"),
+    "a marking of a larger net": ("weak", of_set(markings=["5", "f5"]), "a place that the net does not have"),
+    "a marking twice": ("weak", of_set(markings=["5", "5"]), "not in order"),
+    "a marking too early": ("weak", of_set(markings=["6", "5"]), "not in order"),
+    "a capital digit": ("weak", of_set(markings=["5", "A"]), "match pattern"),
+    "a zero before a number": ("weak", of_set(markings=["05"]), "match pattern"),
+    "a negative rank": ("weak", of_certificate(ranks=[[-1], [0], [], []]), "greater than or equal to 0"),
+    "a key that is none": ("weak", of_certificate(note=""), "Extra inputs"),
+    "a key of a claim that is none": ("weak", of_claim(note=""), "Extra inputs"),
+    "an enumeration's other name": ("weak", of_claim(fairness="WEAK"), "weak"),
+}
+
+
+def sealed(data: dict[str, Any]) -> str:
+    return json.dumps({**data, "seal": seal(data)})
+
+
+@pytest.mark.parametrize("what", CHANGES)
+def test_a_document_is_refused_that_names_what_is_none(what: str) -> None:
+    example, change, reason = CHANGES[what]
+    found = EXAMPLES[example]()
+    assert found is not None
+    data = json.loads(document(found).to_text())
+    change(data)
+    with pytest.raises(InputError) as caught:
+        document_from_text(sealed(data))
+    (told,) = caught.value.diagnostics
+    assert told.code == "F6001"
+    assert reason in told.message
+
+
+def test_a_key_that_stands_twice_is_refused() -> None:
+    found = EXAMPLES["invariant"]()
+    assert found is not None
+    text = document(found).to_text()
+    assert text.count('"depth":0') == 1
+    with pytest.raises(InputError, match="a key stands twice"):
+        document_from_text(text.replace('"depth":0', '"depth":1,"depth":0'))
