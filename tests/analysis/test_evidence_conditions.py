@@ -324,6 +324,8 @@ RUNS: dict[str, Callable[[], Evidence]] = {
     "the cycle does not close": lambda: run(ENDING, refuted("F b"), "", "end"),
     "the run could go on": lambda: run(ENDING, refuted("F b"), ""),
     "the run satisfies it": lambda: run(LOOP, refuted("X b"), "", "t0 t1"),
+    "not both hold": lambda: run(LOOP, refuted("not (a and X a)"), "", "t0 t1"),
+    "one of both holds": lambda: run(LOOP, refuted("a or X a"), "", "t0 t1"),
     "until it ends it does not hold": lambda: run(LOOP, refuted("not (z U b)"), "", "t0 t1"),
     "it never ends": lambda: run(LOOP, refuted("not (a or b) U z or G (a or b)"), "", "t0 t1"),
     "after the cycle comes its first": lambda: run(LOOP, refuted("X X a"), "", "t0 t1"),
@@ -402,6 +404,10 @@ GATED = Net(
     (Place("a", marked=True), Place("b"), Place("g", marked=True)),
     (Transition("t0", ("a",), ("b",), inhibitive=("g",)), Transition("t1", ("b",), ("a",))),
 )
+HALTED = net("halted", "a", ("a", "b"), ("bd", "ace"), ("ce", "d"))  # d would have to come before it can come
+HALF_DONE = InductiveInvariant(
+    (Equation((("a", 1), ("b", 1)), 1), Equation((("c", 1), ("d", 1)), 0), Equation((("d", 1), ("e", 1)), 0))
+)
 READ = Net("read", SHUT.places, (Transition("t0", ("a",), ("b",), ("a",)),))
 ONE_OF_TWO = InductiveInvariant((Equation((("a", 1), ("b", 1)), 1),))
 NO_CONTACT = InductiveInvariant((Equation((("a", 1), ("b", 1)), 1), Equation((("c", 1), ("d", 1)), 1)))
@@ -420,6 +426,7 @@ EACH_ONCE = InductiveInvariant(tuple(Equation(tuple((name, 1) for name in names)
 THEOREMS: dict[str, Callable[[], Evidence]] = {
     "a circuit without a token": lambda: theorem(UNMARKED, TheoremName.MARKED_GRAPH, NO_TOKEN),
     "a marked graph with an end": lambda: theorem(ENDING, TheoremName.MARKED_GRAPH, ONE_OF_TWO),
+    "a circuit that two tokens are waited for in": lambda: theorem(HALTED, TheoremName.MARKED_GRAPH, HALF_DONE),
     "no marked graph": lambda: theorem(HALF_LIVE, TheoremName.MARKED_GRAPH, ONE_TOKEN),
     "no trap in a siphon": lambda: theorem(HALF_LIVE, TheoremName.FREE_CHOICE, ONE_TOKEN, "abc"),
     "no traps at all": lambda: theorem(HALF_LIVE, TheoremName.FREE_CHOICE, ONE_TOKEN),
