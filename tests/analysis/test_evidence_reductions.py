@@ -16,8 +16,10 @@ from support.true_claims import true
 
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.certificate import (
+    Clause,
     Equation,
     InductiveInvariant,
+    Inequality,
     Labelling,
     Markings,
     Ranks,
@@ -249,6 +251,15 @@ FALSE: dict[str, Callable[[], Evidence]] = {
     ),
     "the sums speak of places of the net": lambda: of_rings(
         replace(LEFT, then=InductiveInvariant((*SUM.equations, Equation((("a", 1), ("b", 1)), 1))))
+    ),
+    "the lower bounds speak of places of the net": lambda: of_rings(
+        replace(LEFT, then=replace(SUM, inequalities=(Inequality((("a", 1), ("b", 1)), 1),)))
+    ),
+    "the clauses speak of places of the net": lambda: of_rings(
+        replace(LEFT, then=replace(SUM, clauses=(Clause(("a", "b")),)))
+    ),
+    "the clauses speak of empty places of the net": lambda: of_rings(
+        replace(LEFT, then=replace(SUM, clauses=(Clause(empty=("a", "b")),)))
     ),
     "the sets are of a larger net": lambda: of_rings(
         replace(LEFT, then=StubbornSets(Markings((0b01, 0b10)), (0b111,), (0, 0)))
