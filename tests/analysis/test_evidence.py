@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.dense_nets import PLACES, dense_nets
 from support.evidence import certified, document
-from support.evidence_examples import EXAMPLES, induced
+from support.evidence_examples import ENDING, EXAMPLES, LOOP, induced
 from support.examples import examples
 from support.second_solver import by_cvc5
 from support.true_claims import true
@@ -20,6 +20,7 @@ from support.whole_nets import formulas
 
 from firable.analysis.evidence.certificate import (
     Clause,
+    Diagram,
     Equation,
     FiringSequence,
     InductiveInvariant,
@@ -277,6 +278,33 @@ def test_transitions_that_fire_are_in_order_each_once(example: Evidence, fires: 
 def test_every_obligation_is_discharged_by_a_second_solver(example: Evidence) -> None:
     texts = [obligation.text(example) for obligation in obligations(example)]
     assert {by_cvc5(text) for text in [*texts, *filter(None, [sums_text(example)])]} <= {"unsat"}
+
+
+ONLY_A, ONLY_B = Diagram(("a", "b", "z"), ((1, 0, 1),), (2,)), Diagram(("a", "b"), ((2, 0, 1),), (2,))
+A_OR_B = Diagram(("a", "b", "z"), ((1, 0, 1), (2, 2, 1)), (3,))
+
+
+@pytest.mark.parametrize(
+    ("net", "space", "goal", "wrong"),
+    [
+        (ENDING, Markings((2,)), "a", ["initial"]),
+        (ENDING, ONLY_B, "a", ["initial"]),
+        (LOOP, Markings((1,)), "b", ["step"]),
+        (LOOP, ONLY_A, "b", ["step"]),
+        (LOOP, Markings((1, 2)), "b", ["goal"]),
+        (LOOP, A_OR_B, "b", ["goal"]),
+        (LOOP, A_OR_B, "z or a and b", []),
+    ],
+)
+def test_what_a_set_does_not_show_is_an_obligation_that_does_not_hold(
+    net: Net, space: Markings | Diagram, goal: str, wrong: list[str]
+) -> None:
+    claim = Claim(ClaimKind.NEVER, parse_formula(goal))
+    evidence = Evidence(net, Discipline.INTERLEAVING, claim, Labelling(space))
+    told = {obligation.name: by_cvc5(obligation.text(evidence)) for obligation in obligations(evidence)}
+    assert [name for name, answer in told.items() if answer == "sat"] == wrong
+    assert [obligation.name for obligation in obligations(evidence, closed=True)] == ["goal"]
+    assert refuses(evidence) is bool(wrong)
 
 
 def test_the_markings_need_each_of_them() -> None:

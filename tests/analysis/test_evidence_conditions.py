@@ -376,6 +376,9 @@ RUNS: dict[str, Callable[[], Evidence]] = {
         Claim(ClaimKind.LOST, Not(Start())),
         Continuation((("t0",), ("t1",)), Labelling(Markings((1, 2)))),
     ),
+    "it takes more firings than are looked at": lambda: replace(
+        by_clauses(LATE, "c"), certificate=InductiveInvariant((Equation((("a", 1), ("b", 1), ("c", 1)), 1),), depth=1)
+    ),
     "nothing is initial": lambda: by_clauses(LOOP, "a", Clause(empty=("a",)), Clause(empty=("b",))),
     "nothing is kept": lambda: by_clauses(LOOP, "b", Clause(marked=("a",)), Clause(empty=("b",))),
 }
