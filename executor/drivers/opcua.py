@@ -15,7 +15,11 @@ A client that has lost its connection is not repaired: asyncua can reconnect by 
 subscriptions with what was queued in the meantime. A new client begins with what the nodes hold now. So it is where the
 server answers, and has dropped the subscription or tells of it no more: what was read once would look good for ever.
 While nothing changes it is to say that it is there several times within the time of an answer; asyncua would have it
-do so every three quarters of an hour, and subscribe anew by itself.
+do so every three quarters of an hour, and subscribe anew by itself. A server that will not do so in time is refused.
+
+Messages of a subscription are numbered. asyncua goes on behind one that it cannot read, and what that has told would be
+missing without a word, the contact of an emergency stop as much as anything else: so a number that is missing ends the
+connection.
 """
 
 from __future__ import annotations
@@ -30,7 +34,7 @@ from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, cast
 from urllib.parse import urlsplit
 from uuid import UUID
 
@@ -60,6 +64,7 @@ if TYPE_CHECKING:
     from asyncua.client.client import Client
     from asyncua.common.node import Node
     from asyncua.common.subscription import Subscription
+    from asyncua.ua.uaprotocol_auto import PublishResult
 
 QUEUE: Final = 1000
 """How many changes of a node the server keeps between two of its messages."""
@@ -157,7 +162,6 @@ class OpcUaConnection(Stepwise):
 
     async def open(self, every_s: float, namespaces: Mapping[int, str]) -> None:
         """Connect, and subscribe to what is wanted."""
-        from asyncua.common.subscription import Subscription
         from asyncua.ua.uaprotocol_auto import CreateSubscriptionParameters, ModifySubscriptionParameters
         from asyncua.ua.uatypes import Byte, Double, UInt32
 
@@ -184,12 +188,11 @@ class OpcUaConnection(Stepwise):
             Priority=Byte(0),
         )
         # Not one of the client, which would subscribe anew by itself, and have the server say seldom that it is there.
-        subscription = Subscription(self.client.uaclient.session, asked, self)
+        subscription = _numbered()(self.client.uaclient.session, asked, self)
         given = await subscription.init()
-        every_s = given.RevisedPublishingInterval / 1000
-        signs: int = given.RevisedMaxKeepAliveCount
+        within_s = given.RevisedPublishingInterval / 1000 * max(1, given.RevisedMaxKeepAliveCount)
         if given.RevisedPublishingInterval != asked.RequestedPublishingInterval:
-            counts = self._counts(every_s)
+            counts = self._counts(given.RevisedPublishingInterval / 1000)
             changed = ModifySubscriptionParameters(
                 SubscriptionId=given.SubscriptionId,
                 RequestedPublishingInterval=given.RevisedPublishingInterval,
@@ -199,12 +202,17 @@ class OpcUaConnection(Stepwise):
                 Priority=asked.Priority,
             )
             kept = await self.client.uaclient.session.update_subscription(changed)
-            every_s, signs = kept.RevisedPublishingInterval / 1000, kept.RevisedMaxKeepAliveCount
+            within_s = kept.RevisedPublishingInterval / 1000 * max(1, kept.RevisedMaxKeepAliveCount)
+        most_s = max(every_s, self.wanted.timeout_s)
+        if not 0 <= within_s <= most_s:
+            raise LinkError(
+                f"the server would say every {within_s:g} s that it is there, not at least every {most_s:g} s"
+            )
         if (publishing := self.client.uaclient.session._publish_task) is not None:
             publishing.add_done_callback(self._ended)
         if nodes:
             several: Iterable[Node] = nodes
-            self._look(subscription, every_s * max(1, signs) + self.wanted.timeout_s, monotonic())
+            self._look(subscription, within_s + self.wanted.timeout_s, monotonic())
             made = await subscription.subscribe_data_change(several, queuesize=QUEUE, sampling_interval=Double(0))
             for point, one in zip(self.wanted.read, made, strict=True):
                 if not isinstance(one, int):
@@ -212,7 +220,7 @@ class OpcUaConnection(Stepwise):
 
     def _counts(self, every_s: float) -> tuple[int, int]:
         """After how many intervals the server may drop the subscription, and is to say that it is there (Part 4)."""
-        signs = max(1, int(self.wanted.timeout_s / SIGNS / max(every_s, 0.001)))
+        signs = max(1, int(self.wanted.timeout_s / SIGNS / max(0.001, every_s)))
         return max(10_000, 3 * signs), signs
 
     async def read(self) -> Sequence[tuple[Point, Value]]:
@@ -283,6 +291,11 @@ class OpcUaConnection(Stepwise):
         else:
             self.told.put_nowait(LinkError(f"the server has told nothing of the subscription for {within_s:g} s"))
 
+    def published(self, number: int, before: int | None) -> None:
+        """A message of the subscription has come, with its number; the first may have any."""
+        if before is not None and number > before + 1:
+            self.told.put_nowait(LinkError("what the server has told was lost, or is what nobody can read"))
+
     @property
     def _transport(self) -> asyncio.Transport | None:
         protocol = self.client.uaclient.protocol
@@ -330,6 +343,20 @@ class OpcUaConnection(Stepwise):
             raise LinkError(f"the server does not let '{writes[0][0]}' be written: {error}") from None
         except (ValueError, TypeError) as error:
             raise LinkError(f"'{writes[0][0]}' does not take {writes[0][1]!r}: {error}") from None
+
+
+def _numbered() -> type[Subscription]:
+    """A subscription that tells its connection the number of each message, read or signs of life alone."""
+    from asyncua.common.subscription import Subscription
+
+    class Numbered(Subscription):
+        async def publish_callback(self, publish_result: PublishResult) -> None:
+            cast("OpcUaConnection", self._handler).published(
+                publish_result.NotificationMessage.SequenceNumber, self.last_sequence_number
+            )
+            await super().publish_callback(publish_result)
+
+    return Numbered
 
 
 def _typed(value: Value, kind: Any) -> Value:

@@ -110,6 +110,67 @@ class TestOpcUa(DriverConformance):
 
         self.run(main())
 
+    def test_a_change_that_nobody_can_read_ends_the_connection_though_the_server_goes_on(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """asyncua drops it: a contact of the emergency stop that has opened would look closed for ever."""
+        from asyncua.client.ua_session import UaSession
+        from asyncua.ua.uaerrors import UaStructParsingError
+
+        publish, is_readable = UaSession.publish, True
+
+        async def unreadable(*args: Any) -> Any:
+            answer = await publish(*args)
+            if not is_readable and answer.Parameters.NotificationMessage.NotificationData:
+                raise UaStructParsingError
+            return answer
+
+        async def main() -> None:
+            nonlocal is_readable
+            await self.end.start(lambda _point, _value: None)
+            self.end.show(POINTS["sensor"], value=False)
+            monkeypatch.setattr(UaSession, "publish", unreadable)
+            options = OpcUaOptions(url=f"opc.tcp://127.0.0.1:{self.end.port}/")
+            connection = await KIND.connect(options, Wanted((POINTS["sensor"],), 1.0))
+            assert await connection.read() == [(POINTS["sensor"], False)]
+            is_readable = False
+            self.end.show(POINTS["sensor"], value=True)
+            with pytest.raises(LinkError, match="was lost, or is what nobody can read"):
+                await asyncio.wait_for(connection.read(), PATIENCE_S)
+            await connection.close()
+            await self.end.stop()
+
+        self.run(main())
+
+    @pytest.mark.parametrize("revised_ms", [float("nan"), float("inf"), -20.0, 3_600_000.0])
+    def test_a_server_that_would_not_say_in_time_that_it_is_there_is_refused(
+        self, revised_ms: float, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        from asyncua.client.ua_session import UaSession
+
+        for name in ("create_subscription", "update_subscription"):
+            monkeypatch.setattr(UaSession, name, revising(getattr(UaSession, name), revised_ms))
+
+        async def main() -> None:
+            await self.end.start(lambda _point, _value: None)
+            options = OpcUaOptions(url=f"opc.tcp://127.0.0.1:{self.end.port}/")
+            with pytest.raises(LinkError, match=r"would say every \S+ s that it is there, not at least every 10 s"):
+                await KIND.connect(options, Wanted((POINTS["sensor"],), 10.0))
+            await self.end.stop()
+
+        self.run(main())
+
+
+def revising(ask: Any, revised_ms: float) -> Any:
+    """A question about a subscription, in whose answer the server has another interval."""
+
+    async def asked(*args: Any, **keys: Any) -> Any:
+        answer = await ask(*args, **keys)
+        answer.RevisedPublishingInterval = revised_ms
+        return answer
+
+    return asked
+
 
 @pytest.mark.parametrize("at", [{2: "urn:a", 3: "urn:b"}, {2: "urn:b", 3: "urn:a"}, {4: "urn:a"}])
 def test_a_node_is_found_wherever_the_server_has_its_namespace(
