@@ -57,6 +57,9 @@ NOT_LET_IN: Final = frozenset({134, 135})
 REFUSED: Final = 0x80
 """From here on the codes of a broker say that it does not do what it was asked for."""
 
+MESSAGE_BYTES_MAX: Final = 1 << 20
+"""A longer message is none of a device; who may publish at a broker may send 256 MB, which take seconds to receive."""
+
 
 class MqttTls(BaseModel):
     """The files of TLS: the authority of the broker, and a certificate of one's own where the broker asks for one."""
@@ -173,6 +176,7 @@ class MqttConnection(Stepwise):
                 with suppress(MqttError):  # when it has seen that
                     while await anext(self.client.messages):
                         pass
+            self.client._client._sock_close()  # which else is watched on behind what nobody could read
             if (gone := self.client._disconnected).done() and not gone.cancelled():
                 gone.exception()  # nobody else asks, where it was gone before anything was read
 
@@ -187,9 +191,28 @@ def _unless_closed(
             raise
 
 
+def _bounded(paho: Any) -> Callable[[int], bytes]:
+    """How paho receives the next bytes of a message; raises `LinkError`, which ends the connection.
+
+    It would take a message of any length in one turn of the event loop, and as many messages as a broker leaves open
+    that are to be acknowledged twice (QoS 2), for which nobody has asked.
+    """
+    receive: Callable[[int], bytes] = paho._sock_recv
+
+    def received(size_bytes: int) -> bytes:
+        if size_bytes > MESSAGE_BYTES_MAX:
+            raise LinkError(f"a message of {size_bytes} bytes, more than a device has to tell")
+        if paho._in_messages:
+            raise LinkError("a message that is to be acknowledged twice, which nobody has asked for")
+        return receive(size_bytes)
+
+    return received
+
+
 def _why(error: MqttError) -> str:
     """What has failed, without the number that stands before it."""
-    return _NUMBER.sub("", str(error))
+    cause = error.__cause__
+    return _NUMBER.sub("", str(cause if isinstance(cause, LinkError) else error))
 
 
 class Mqtt:
@@ -229,7 +252,9 @@ class Mqtt:
             socket_options=[DROPPING],
         )
         client._loop = cast("asyncio.AbstractEventLoop", Guarded(asyncio.get_running_loop()))
-        client._client.connect_timeout = wanted.timeout_s  # of a thread that no cancellation ends, nor a stop before it
+        paho: Any = client._client  # of which a method is replaced
+        paho._sock_recv = _bounded(paho)
+        paho.connect_timeout = wanted.timeout_s  # of a thread that no cancellation ends, nor a stop before it
         connection = MqttConnection(client, wanted)
         try:
             await connection.open()

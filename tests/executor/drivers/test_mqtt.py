@@ -21,7 +21,7 @@ from firable.executor.drivers.far_side.ends import PORTS
 from firable.executor.drivers.far_side.machine import ROLES
 from firable.executor.drivers.far_side.mqtt_device import MqttEnd, mosquitto
 from firable.executor.drivers.far_side.ports import free_port
-from firable.executor.drivers.mqtt import KIND, Guarded, MqttOptions
+from firable.executor.drivers.mqtt import KIND, Guarded, MqttConnection, MqttOptions
 
 needs_mosquitto = pytest.mark.skipif(mosquitto() is None, reason="needs the broker mosquitto, which is not installed")
 
@@ -103,6 +103,47 @@ def test_a_broker_that_does_not_let_a_topic_be_read_is_told_and_leaves_no_error_
         return left
 
     assert asyncio.run(main()) == []
+
+
+@pytest.mark.parametrize(
+    ("told", "why"),
+    [
+        (b"\x30\x84\x80\x80\x01\x00\x01s1", "a message of 2097156 bytes, more than a device has to tell"),
+        (b"\x34\x06\x00\x01s\x00\x07" + b"1" + b"\x30\x04\x00\x01s1", "a message that is to be acknowledged twice"),
+        (b"\x30\x04\x00\x01\xff1", "Disconnected"),
+    ],
+    ids=["too long", "twice", "unreadable"],
+)
+def test_what_no_device_tells_ends_the_connection_at_once_and_is_watched_no_more(told: bytes, why: str) -> None:
+    """Who may publish at a broker can send 256 MB, for which the event loop stood still for seconds."""
+
+    async def main() -> None:
+        async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            await reader.read(1000)
+            writer.write(b"\x20\x02\x00\x00")
+            subscribing = await reader.read(1000)
+            writer.write(b"\x90\x04" + subscribing[2:4] + b"\x01\x01")
+            own = await reader.read(1000)
+            topic = own[2 : 4 + own[3]]
+            writer.write(b"\x40\x02" + own[len(topic) + 2 : len(topic) + 4])
+            writer.write(b"\x30" + bytes([len(topic) + 1]) + topic + b"1" + told)
+            await reader.read()
+
+        server = await asyncio.start_server(serve, "127.0.0.1", 0)
+        options = MqttOptions(host="127.0.0.1", port=server.sockets[0].getsockname()[1])
+        connection = await KIND.connect(options, Wanted(("s",), timeout_s=10.0))
+        assert isinstance(connection, MqttConnection)
+        watched = connection.client._client.socket()
+        assert isinstance(watched, socket.socket)
+        descriptor = watched.fileno()
+        assert await connection.read() == []
+        with pytest.raises(LinkError, match=why):
+            await asyncio.wait_for(connection.read(), 10.0)
+        await connection.close()
+        assert not asyncio.get_running_loop().remove_reader(descriptor)
+        server.close()
+
+    asyncio.run(main())
 
 
 def test_a_socket_that_is_closed_before_it_is_watched_leaves_no_error_to_the_event_loop() -> None:
