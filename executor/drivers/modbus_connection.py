@@ -5,10 +5,11 @@ in one request, so that a command and its number reach the device in one piece. 
 and a command goes before the next poll.
 
 A request that is not answered in time ends the connection. Frames over TCP carry a transaction number and pymodbus
-looks at it, frames of RTU carry none: there a late answer would be the answer to the next question. So an answer must
-fit its question, and a line is not left before the answer has come that is still owed, or its time is over (`close`).
-An answer that could be one to another poll as well is given that time once more before the line is used again
-(`owed_seconds`): of two inputs of one device that is late, the one would be shown in the place of the other.
+looks at it, as long as it is not 0; frames of RTU carry none: there a late answer would be the answer to the next
+question. So an answer must fit its question, and a line is not left before the answer has come that is still owed, or
+its time is over (`close`). An answer that could be one to another poll as well is given that time once more before the
+line is used again (`owed_seconds`): of two inputs of one device that is late, the one would be shown in the place of
+the other.
 
 What is asked, how it is written and read, and the transport are those of pymodbus; only the waiting is done here
 (`ModbusConnection.ask`). Its `execute` sets a timer for each request, and passes an answer on through three coroutines
@@ -339,7 +340,8 @@ class ModbusConnection(Stepwise):
             self.is_asking = False
             if not answer.cancelled():
                 self._hand_on()
-        if shown.function_code & ~_REFUSED != question.request.function_code:
+        asked = question.request
+        if (shown.function_code & ~_REFUSED, shown.transaction_id) != (asked.function_code, asked.transaction_id):
             raise LinkError(f"an answer to another question than that for {question.what}")
         self.is_owed = False
         if shown.isError():

@@ -181,6 +181,27 @@ def test_answer_that_is_not_to_the_question_is_none(question: str, answer: str, 
     assert not errors
 
 
+def test_answer_without_a_number_over_tcp_is_none() -> None:
+    """One that comes twice would be taken for that to another poll."""
+
+    async def main() -> None:
+        async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            asked = await reader.read(12)
+            for _ in range(2):
+                writer.write(bytes.fromhex("0000 0000 0004") + asked[6:8] + bytes.fromhex("01 01"))
+                asked = await reader.read(12)
+
+        server = await asyncio.start_server(serve, "127.0.0.1", 0)
+        options = modbus.TcpOptions(host="127.0.0.1", port=server.sockets[0].getsockname()[1], every_s=0)
+        connection = await modbus.TCP.connect(options, Wanted(("discrete 2", "discrete 7"), PATIENCE_S))
+        with pytest.raises(LinkError, match="an answer to another question than that for discrete 2"):
+            await asyncio.wait_for(connection.read(), PATIENCE_S)
+        await connection.close()
+        server.close()
+
+    asyncio.run(main())
+
+
 LATE = """{firable_bind: 1, cell: c, devices: {D: {driver: modbus-rtu, port: PORT, parity: N, timeout_s: 0.4}},
 signals: {dark: {device: D, read: discrete 2, on_loss: hold}, lit: {device: D, read: discrete 7, on_loss: hold}}}"""
 
