@@ -9,6 +9,7 @@ import click
 
 from firable.cli import text
 from firable.cli.log import told_aside
+from firable.cli.options import binding_of
 from firable.cli.report import Report
 from firable.cli.watched import AFTER_A_FAULT, machines_verdict, show_coalesced, since
 
@@ -24,11 +25,10 @@ _BLOCKED_SHOWN = 6
 
 def run_bound_of(path: str, bundle: Bundle, bind: str, conduct: Conduct, plant: PlantModel | None) -> Report:
     """Run until the operator stops it or nothing can go on, and report how it ended."""
-    from firable.executor.drivers.binding import read_binding
     from firable.executor.operating.running import run_bound
 
     with told_aside(_told, conduct.log) as tell:
-        report = run_bound(bundle, read_binding(bind), replace(conduct, tell=tell), plant=plant)
+        report = run_bound(bundle, binding_of(bind), replace(conduct, tell=tell), plant=plant)
     known = report.to_json()
     of_workpieces = {"delivered", "inside", "lost", "doubled", "decided", "simulated_seconds"}
     kept = {key: value for key, value in known.items() if key not in of_workpieces}

@@ -15,7 +15,7 @@ from firable.cli import text
 from firable.cli.files import JOURNAL, READ
 from firable.cli.finite import FiniteRange
 from firable.cli.log import told_aside
-from firable.cli.options import is_given
+from firable.cli.options import binding_of, is_given, warn_of_open_key
 from firable.cli.report import Report
 from firable.cli.watched import AFTER_A_FAULT_OF_A_HOST, machines_verdict, show_coalesced
 from firable.nets.source import printable
@@ -230,11 +230,10 @@ def _drivers(bundle: Bundle, machines: tuple[str, ...], options: HostOptions) ->
     if options.bind is not None and options.dry_run is not None:
         raise click.UsageError("--bind is for machines and --dry-run for none: give one of them")
     if options.bind is not None:
-        from firable.executor.drivers.binding import read_binding
         from firable.executor.drivers.bound import bound_driver
 
         own = own_net(bundle.decomposition, machines)
-        return partial(bound_driver, read_binding(options.bind), bundle.net, own)
+        return partial(bound_driver, binding_of(options.bind), bundle.net, own)
     net = own_net(bundle.decomposition, machines)
     if options.dry_run is None and (net.signals or any(place.command for place in net.places)):
         raise click.UsageError("say with --bind where the machines of this host are, or --dry-run without any")
@@ -265,6 +264,8 @@ def _link(bundle: Bundle, machines: tuple[str, ...], options: HostOptions) -> tu
         raise click.UsageError("--tls is for tls/ addresses, and without one nothing is encrypted: write tls/HOST:PORT")
     if options.certified and len(secured) < len(options.listen) + len(options.join):
         raise click.UsageError("--certified is of tls/ addresses alone: over tcp/ nobody shows a certificate")
+    if options.tls is not None:
+        warn_of_open_key(options.tls[2])
     network = Network(options.listen, options.join, options.tls, options.certified, options.lease)
     link = make_link(bundle, machines, network)
     from firable.executor.links.zenoh_link import open_to_the_network

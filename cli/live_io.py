@@ -15,7 +15,7 @@ import click
 from firable.cli.choice import OneOf
 from firable.cli.files import READ
 from firable.cli.finite import FiniteRange
-from firable.cli.options import load_net
+from firable.cli.options import binding_of, load_net
 
 if TYPE_CHECKING:
     import asyncio
@@ -77,14 +77,13 @@ def live_io(
     """
     import asyncio
 
-    from firable.executor.drivers.binding import read_binding
     from firable.executor.drivers.fitting import misfits
     from firable.executor.operating.uncut import ended_by_signals
     from firable.nets.diagnostics import InputError
 
     if once and seconds is not None:
         raise click.UsageError("--once ends by itself when everything has been read: leave out --for")
-    binding = read_binding(bind)
+    binding = binding_of(bind)
     if unreadable := tuple(binding.unreadable()):
         raise InputError(unreadable)
     forced = [_forced(binding, text) for text in force]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import ssl
-import stat
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -16,6 +15,7 @@ import click
 
 from firable.cli.choice import OneOf
 from firable.cli.files import READ
+from firable.cli.options import warn_of_open_key
 from firable.nets.source import printable
 
 if TYPE_CHECKING:
@@ -74,7 +74,10 @@ class ServeOptions:
         host, _, port = serve.rpartition(":")
         if not host or not port.isdecimal() or int(port) > 65535:
             raise click.UsageError(f"--serve {serve}: write ADDRESS:PORT, such as 127.0.0.1:8080")
-        tls = None if self.serve_tls is None else tls_context(*self.serve_tls, self.operators)
+        tls = None
+        if self.serve_tls is not None:
+            tls = tls_context(*self.serve_tls, self.operators)
+            warn_of_open_key(self.serve_tls[1])
         token = new_token() if self.token_file is None else _token_kept(Path(self.token_file))
         endpoint = Endpoint(host.strip("[]"), int(port), token, tls)
         opening = None
@@ -277,11 +280,12 @@ def _told(answer: dict[str, Any]) -> str:
 def _token_kept(path: Path) -> str:
     """The token in a file, which is made with a new one if there is none."""
     from firable.executor.operating.control import new_token
+    from firable.nets.secret_files import is_open_to_all
     from firable.nets.writing import stands
 
     if stands(path):
         token = _token_read(path)
-        if path.stat().st_mode & (stat.S_IROTH | stat.S_IWOTH):
+        if is_open_to_all(path):
             raise _open_to_all(path)
         return token
     token = new_token()
@@ -336,6 +340,7 @@ def client_tls(ca: str | None, cert: tuple[str, str] | None) -> ssl.SSLContext:
         if cert is not None:
             what, files = "your certificate", list(cert)
             context.load_cert_chain(*cert)
+            warn_of_open_key(cert[1])
             if fault := fault_of(*cert, is_server=False):
                 hint = "renew it, or set the clock of this host"
     except (OSError, ValueError) as error:

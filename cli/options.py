@@ -16,9 +16,11 @@ from firable.cli.choice import OneOf
 from firable.cli.files import CATALOGUE, OTHER_FILES, READ, WRITTEN, is_folder, nets_below, refuse_to_overwrite, stem
 from firable.cli.finite import FiniteRange
 from firable.cli.report import Outcome, Report, document, exit_code_of, worst
+from firable.cli.text import show_diagnostic
 
 if TYPE_CHECKING:
     from firable.analysis.spaces.reachability import Budget
+    from firable.executor.drivers.binding import Binding
     from firable.nets.diagnostics import Diagnostic
     from firable.nets.loading import Loaded
     from firable.nets.net import Net
@@ -103,12 +105,29 @@ def with_page(make: Callable[[], Report], path: str | None) -> Callable[[], Repo
 def demand_bound(bind: str | None, net: Net) -> None:
     """Raise `InputError` (F5101, F5102) where a binding is named that does not fit the net."""
     if bind is not None:
-        from firable.executor.drivers.binding import read_binding
         from firable.executor.drivers.fitting import misfits
         from firable.nets.diagnostics import InputError
 
-        if problems := misfits(read_binding(bind), net):
+        if problems := misfits(binding_of(bind), net):
             raise InputError(problems)
+
+
+def binding_of(bind: str) -> Binding:
+    """The binding of a file, telling of what in it is no secret."""
+    from firable.executor.drivers.binding import read_binding
+
+    binding = read_binding(bind)
+    for problem in binding.exposed():
+        show_diagnostic(problem)
+    return binding
+
+
+def warn_of_open_key(path: str) -> None:
+    """Tell where the key of a certificate is no secret."""
+    from firable.nets.secret_files import warning_if_open
+
+    for problem in warning_if_open(path, "key"):
+        show_diagnostic(problem)
 
 
 def is_given(name: str) -> bool:

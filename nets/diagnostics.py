@@ -145,6 +145,8 @@ CODES: Final[dict[str, str]] = {
     "F5023": "a bundle without the signature that is demanded",
     "F5024": "a key or signatures that are none, or damaged",
     "F5025": "a host without the journal that it had",
+    "F5026": "a secret that everybody on this host can read",
+    "F5027": "a password that anybody on the network can read",
     "F5031": "the journal of another bundle",
     "F5032": "the journal is damaged",
     "F5033": "the journal is in use",

@@ -28,6 +28,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from firable.nets.bundle import Bundle
 from firable.nets.diagnostics import Diagnostic, InputError, Span
 from firable.nets.interchange import canonical_json
+from firable.nets.secret_files import is_open_to_all
 from firable.nets.source import printable, read_bytes
 from firable.nets.writing import stands, write_whole
 
@@ -88,7 +89,8 @@ def make_key(path: str | Path) -> str:
 def sign(bundle: Bundle, bundle_path: str | Path, key_path: str | Path) -> str:
     """Sign a bundle with the secret key in a file, beside the signatures that it has; the name of the key.
 
-    Raises `InputError` F5024 where that is no secret key, or the file of signatures is damaged; F1017.
+    Raises `InputError` F5024 where that is no secret key, or the file of signatures is damaged; F5026 where the key is
+    no secret; F1017.
     """
     key = _secret(key_path)
     at = signatures_path(bundle_path)
@@ -146,6 +148,9 @@ def _record(at: Path) -> SignaturesRecord:
 
 def _secret(path: str | Path) -> Ed25519PrivateKey:
     data = read_bytes(path, _SIZE_BYTES_MAX)
+    if is_open_to_all(path):
+        hint = f"make another one, where somebody may have done that; else `chmod o-rw {printable(str(path))}`"
+        raise _refusal("F5026", path, "everybody on this host can read this key, or change it", hint)
     try:
         key = serialization.load_pem_private_key(data, password=None)
     except TypeError:  # what the library says of a key with a passphrase

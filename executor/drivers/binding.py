@@ -25,9 +25,10 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from firable.executor.drivers.device import Bounded, DeviceKind, Divided, Options, Point, Use, Value, Writes, files_of
 from firable.executor.drivers.kinds import kind_named
 from firable.executor.drivers.overlapping import overlaps
-from firable.nets.diagnostics import Diagnostic, InputError, did_you_mean
+from firable.nets.diagnostics import Diagnostic, InputError, Severity, did_you_mean
 from firable.nets.document import as_list, given
 from firable.nets.document_errors import Shape, document_problems, keys_of, version_problem
+from firable.nets.secret_files import warning_if_open
 from firable.nets.source import Source, printable, quoted, read_bytes, read_source
 from firable.nets.yaml_tree import Data, Node, data, node_span, nodes_along, parse_tree
 from firable.nets.yaml_tree import Path as TreePath
@@ -232,6 +233,20 @@ class Binding:
                         yield self.problem(
                             one.code, ("devices", name, *keys), f"{printable(file)}: {one.message}", hint
                         )
+
+    def exposed(self) -> Iterator[Diagnostic]:
+        """Warnings of what is no secret: passwords on a network (F5027), passwords and keys on this host (F5026)."""
+        for name, options in self.options.items():
+            if options.is_overheard:
+                message = f"the password of '{name}' goes over the network as it is: whoever is on it can read that"
+                hint = f"encrypt it, as docs/drivers.md tells of `driver: {self.document.devices[name].driver}`"
+                told = self.problem("F5027", ("devices", name, "password"), message, hint)
+                yield replace(told, severity=Severity.WARNING)
+            for keys, file in files_of(options):
+                if keys[-1] == "key":
+                    yield from warning_if_open(file, "key")
+        if any(getattr(one, "password", None) is not None for one in self.options.values()):
+            yield from warning_if_open(self.source.file, "password")
 
     def watching(self) -> Binding:
         """The binding for who only looks: without safe outputs and heartbeats, which are another's to write.

@@ -97,6 +97,11 @@ class Options(BaseModel):
         """How long it may take until a change at the device is shown, because it is asked for it; 0 where it tells."""
         return 0.0
 
+    @property
+    def is_overheard(self) -> bool:
+        """Whether a password goes over a network as it is."""
+        return False
+
     def far_end(self) -> object:
         """What is equal of two devices that are one, however each is spoken with; by default all options."""
         return self

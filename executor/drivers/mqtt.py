@@ -44,6 +44,7 @@ from firable.executor.drivers.device import (
     not_let_in,
     quiet,
 )
+from firable.executor.loopback import is_loopback
 
 if TYPE_CHECKING:
     from aiomqtt import Client, MqttError
@@ -78,6 +79,11 @@ class MqttOptions(Options):
     user: str | None = None
     password: Password = None
     tls: bool | MqttTls = False
+
+    @property
+    def is_overheard(self) -> bool:
+        """Without TLS a password goes out as it is."""
+        return self.password is not None and not self.tls and not is_loopback(self.host)
 
     def far_end(self) -> object:
         """The broker, whoever asks it for what: topics are everybody's."""

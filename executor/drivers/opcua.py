@@ -58,6 +58,7 @@ from firable.executor.drivers.device import (
     not_let_in,
     quiet,
 )
+from firable.executor.loopback import is_loopback
 from firable.executor.reasons import reason
 
 if TYPE_CHECKING:
@@ -124,6 +125,12 @@ class OpcUaOptions(Options):
     def polled_s(self) -> float:
         """The time from one look of the server to the next."""
         return self.every_s
+
+    @property
+    def is_overheard(self) -> bool:
+        """Without security a server is whoever answers, and may ask for the password as it is."""
+        is_open = self.password is not None and self.security is None
+        return is_open and not is_loopback(str(urlsplit(self.url).hostname))
 
     def point_problem(self, point: Point) -> str:
         """An index that means nothing."""

@@ -39,6 +39,7 @@ class Site:
         certificate, secret = self.folder / f"{name}.pem", self.folder / f"{name}.key"
         signed = self._certificate(subject, key, is_authority=False, valid_days=valid_days, at=address, purpose=purpose)
         certificate.write_bytes(signed.public_bytes(serialization.Encoding.PEM))
+        secret.touch(0o600)
         secret.write_bytes(
             key.private_bytes(
                 serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
