@@ -41,6 +41,7 @@ from firable.nets.editing import edits
 from firable.nets.editing.net_file import NetFile
 from firable.nets.machines.closing import close
 from firable.nets.machines.plant_file import parse_plant
+from firable.nets.secret_files import warning_if_open
 from firable.nets.source import Source
 from firable.nets.text import parse_net
 from firable.nets.verdict import Status
@@ -165,6 +166,19 @@ def a_place_that_the_net_has_not(_: Path) -> str:
     return refusal(lambda: moment_of(catalogue_net("one_robot"), asked))
 
 
+def a_key_that_all_can_read(folder: Path) -> str:
+    path = folder / "host.key"
+    path.touch()
+    path.chmod(0o644)
+    return "\n".join(map(str, warning_if_open(path, "key")))
+
+
+def a_password_without_tls(_: Path) -> str:
+    device = "{driver: mqtt, host: 10.1.1.1, user: u, password: p}"
+    binding = parse_binding(f"firable_bind: 1\ncell: c\ndevices:\n  D: {device}\n", "cell.bind.yaml")
+    return "\n".join(map(str, binding.exposed()))
+
+
 def a_fault_of_firable(_: Path) -> str:
     told = io.StringIO()
     with patch.object(firable.analysis.check, "check", side_effect=RuntimeError("planted")), redirect_stderr(told):
@@ -233,6 +247,22 @@ warning[F5022]: tcp/0.0.0.0:7447 is open to the network: whoever reaches it can 
 error[F5025]: 'robot' came back without what was kept there: the journal is another one, or there is none
   hint: start it with the journal that it had (--journal); where that is lost, bring the cell to its initial marking,\
  and start all hosts anew, each with a new journal
+""",
+    ),
+    "F5026": (
+        a_key_that_all_can_read,
+        """\
+warning[F5026]: {folder}/host.key: everybody on this host can read this key, or change it
+  hint: `chmod o-rw {folder}/host.key`
+""",
+    ),
+    "F5027": (
+        a_password_without_tls,
+        """\
+cell.bind.yaml:4:46: warning[F5027]: the password of 'D' goes over the network as it is: whoever is on it can read that
+    4 |   D: {driver: mqtt, host: 10.1.1.1, user: u, password: **
+                                                     ^^^^^^^^
+  hint: encrypt it, as docs/drivers.md tells of `driver: mqtt`
 """,
     ),
     "F5033": (
