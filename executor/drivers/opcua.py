@@ -164,6 +164,8 @@ class OpcUaConnection(Stepwise):
         self.points: dict[str, Point] = {}
         self.types: dict[Point, Any] = {}
         self.is_first = True
+        self.number: int | None = None
+        """The number of the last message that has told something, as far as the first one shows it."""
         self.looking: asyncio.TimerHandle | None = None
         """When it is looked next whether the server still tells of the subscription."""
 
@@ -298,10 +300,12 @@ class OpcUaConnection(Stepwise):
         else:
             self.told.put_nowait(LinkError(f"the server has told nothing of the subscription for {within_s:g} s"))
 
-    def published(self, number: int, before: int | None) -> None:
-        """A message of the subscription has come, with its number; the first may have any."""
-        if before is not None and number > before + 1:
+    def published(self, number: int, *, tells: bool) -> None:
+        """A message of the subscription has come; a sign of life, which tells nothing, has the number of the next."""
+        last = number if tells else number - 1
+        if self.number is not None and last > self.number + tells:
             self.told.put_nowait(LinkError("what the server has told was lost, or is what nobody can read"))
+        self.number = max(last, self.number or 0)
 
     @property
     def _transport(self) -> asyncio.Transport | None:
@@ -358,8 +362,9 @@ def _numbered() -> type[Subscription]:
 
     class Numbered(Subscription):
         async def publish_callback(self, publish_result: PublishResult) -> None:
+            message = publish_result.NotificationMessage
             cast("OpcUaConnection", self._handler).published(
-                publish_result.NotificationMessage.SequenceNumber, self.last_sequence_number
+                message.SequenceNumber, tells=bool(message.NotificationData)
             )
             await super().publish_callback(publish_result)
 

@@ -14,7 +14,7 @@ from firable.executor.drivers.conformance import DriverConformance
 from firable.executor.drivers.device import LinkError, Point, Use, Value, Wanted
 from firable.executor.drivers.far_side.machine import ROLES
 from firable.executor.drivers.far_side.opcua_server import OpcUaEnd
-from firable.executor.drivers.opcua import KIND, OpcUaOptions, spelling
+from firable.executor.drivers.opcua import KIND, OpcUaConnection, OpcUaOptions, spelling
 from firable.nets.diagnostics import InputError
 
 POINTS = {role: f"ns=2;s=M.{role}" for role in (*ROLES, "number")}
@@ -159,6 +159,33 @@ class TestOpcUa(DriverConformance):
             await self.end.stop()
 
         self.run(main())
+
+
+@pytest.mark.parametrize(
+    ("messages", "is_lost"),
+    [
+        ("1 2 3", False),
+        ("1- 1 2- 2 3", False),
+        ("1 1- 2 2- 2- 3", False),
+        ("7 8 8 0-", False),
+        ("4294967295 1 2", False),
+        ("1 3", True),
+        ("1- 2", True),
+        ("1 2- 3-", True),
+        ("1 2 2- 4", True),
+    ],
+    ids=str,
+)
+def test_messages_are_missing_where_numbers_are(messages: str, is_lost: bool) -> None:
+    """A sign of life (-) has the number of the next message, or on some servers that of the last."""
+
+    async def main() -> None:
+        connection = OpcUaConnection(Client("opc.tcp://127.0.0.1:4840/"), Wanted((), 1.0))
+        for message in messages.split():
+            connection.published(int(message.removesuffix("-")), tells=not message.endswith("-"))
+        assert connection.told.empty() != is_lost
+
+    asyncio.run(main())
 
 
 def revising(ask: Any, revised_ms: float) -> Any:
