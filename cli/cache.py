@@ -63,9 +63,9 @@ class Cache:
             data = json.loads(text)
             # As JSON, where an enumeration is a string and a tuple an array.
             records = [VerdictRecord.model_validate_json(json.dumps(verdict)) for verdict in data["verdicts"]]
-        except (OSError, ValueError, KeyError, ValidationError):
+            return Kept(tuple(record.verdict() for record in records), data["figures"], tuple(data["course"]))
+        except (OSError, ValueError, KeyError, TypeError, RecursionError, ValidationError):
             return None
-        return Kept(tuple(record.verdict() for record in records), data["figures"], tuple(data["course"]))
 
     def write(self, key: str, found: Kept) -> None:
         """Keep what was found, unless some of it is unknown or was interrupted; the oldest of a thousand makes room."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from hashlib import sha256
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from typing import Any
@@ -136,6 +137,19 @@ def test_a_damaged_entry_is_no_answer(folder: Path, explored: list[str], capsys:
         before = len(explored)
         assert checked(folder, NET, capsys) == first
         assert len(explored) == before + 1
+
+
+@pytest.mark.parametrize(
+    "text", ["[" * 100_000, "[]", '{"verdicts": 1}', '{"verdicts": [], "figures": {}, "course": 1}']
+)
+def test_an_entry_that_somebody_else_has_written_is_no_answer(
+    text: str, folder: Path, explored: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    first = checked(folder, NET, capsys)
+    (entry,) = (folder / "cache").iterdir()
+    entry.write_text(f"{sha256(text.encode()).hexdigest()}\n{text}", encoding="utf-8")
+    assert checked(folder, NET, capsys) == first
+    assert len(explored) == 2
 
 
 def test_what_is_unknown_is_asked_again(folder: Path, explored: list[str], capsys: pytest.CaptureFixture[str]) -> None:
