@@ -12,7 +12,7 @@ import click
 from firable.cli.files import MADE, READ
 from firable.cli.finite import FiniteRange
 from firable.cli.options import load_net, plant_for, write_text
-from firable.cli.text import show_diagnostic
+from firable.cli.text import counted, show_diagnostic
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -106,6 +106,10 @@ def sim(
     protocols = [name for name, is_chosen in chosen.items() if is_chosen]
     if protocols and bind == "-":
         raise click.UsageError("the binding cannot go to standard output, where it is told what happens: name a file")
+    machines = {place.command.machine for place in loaded.places if place.command is not None}
+    if len(protocols) > len(machines):
+        has = f"the net commands {counted(len(machines), 'machine')}"
+        raise click.UsageError(f"{has}, of which each is served by one protocol: name no more than that")
     if not protocols and bind is None:
         raise click.UsageError("name protocols, such as --modbus --opcua, or a binding to serve, with --bind")
 

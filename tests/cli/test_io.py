@@ -369,6 +369,21 @@ def test_plant_file_beside_the_net_is_the_one_that_is_served(
     assert main(command) == 0
 
 
+def test_no_protocol_is_left_without_a_machine(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    net = "firable: 1\ncell: lamp\nstart: dark\nplaces:\n  dark:\n"
+    net += "  bright: {send: {machine: L, command: SHINE}}\ntransitions:\n  shine: {from: dark, to: bright}\n"
+    plant = "firable_plant: 1\nplant: lamp\nstations: [table]\narrivals: {station: table, every_s: 9}\n"
+    plant += "departures: {station: table}\nmachines:\n  L: {commands: {SHINE: {does: work, takes_s: 1}}}\n"
+    Path("lamp.firable.yaml").write_text(net, "utf-8")
+    Path("lamp.plant.yaml").write_text(plant, "utf-8")
+    assert main(["sim", "lamp.firable.yaml", "--modbus", "--opcua", "--for", "0"]) == 2
+    assert "the net commands 1 machine, of which each is served by one protocol" in capsys.readouterr().err
+    assert main(["sim", "lamp.firable.yaml", "--modbus", "--for", "0"]) == 0
+
+
 def test_what_was_to_go_wrong_and_has_not_is_told_at_the_end(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -123,10 +123,9 @@ def binding_text(net: Net, ports: Mapping[str, str], sensed: Collection[str]) ->
     for layout in direct[:1]:
         read = layout.button(len(net.signals))
         lines += ["", "emergency_stop:", f"  button: {{device: {layout.protocol}, read: {read}}}"]
-    lines += ["", "signals:"]
-    for i, signal in enumerate(net.signals):
-        if signal.kind is SignalKind.TIMER:
-            continue
+    shown = [(i, signal) for i, signal in enumerate(net.signals) if signal.kind is not SignalKind.TIMER]
+    lines += ["", "signals:"] if shown else []
+    for i, signal in shown:
         at = owners.get(signal.owner, layouts[0])
         read = f"{{device: {at.protocol}, {at.sensor(signal.name, i)}}}"
         lines.append(f"  {_word(signal.name)}: {read if signal.name in sensed else 'acknowledged'}")
