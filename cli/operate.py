@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import ssl
 from collections.abc import Callable
@@ -19,6 +20,8 @@ from firable.cli.options import warn_of_open_key
 from firable.nets.source import printable
 
 if TYPE_CHECKING:
+    import aiohttp
+
     from firable.cli.view.site import Opening
     from firable.executor import Host
     from firable.executor.operating.control import Page
@@ -33,6 +36,8 @@ _COMMANDS: Final = (*_READING, "pause", "resume", "step", "stop", "stop-at-end",
 _SECONDS: Final = 10.0
 _TOLD: Final = {"state": str, "message": str, "marking": list, "blocked": list}
 """What is in every answer of a run, but for its figures."""
+_ANSWER_BYTES_MAX: Final = 16 * 1024 * 1024
+"""More than the figures of a cell with thousands of places."""
 _TOKEN_CHARACTERS_MAX: Final = 4000
 """More than a line of HTTP takes; nothing that never ends is a token."""
 NO_BROWSER: Final = "FIRABLE_NO_BROWSER"
@@ -253,9 +258,10 @@ async def ask(address: str, command: str, said: dict[str, str], caller: Caller) 
                 raise refusal(f"{address} does not let you in", "show the token, or the certificate, of this run")
             if answer.status != 200:
                 raise refusal(f"{address} answers {answer.status}", hint)
+            body = await _whole(answer)
             if command == "metrics":
-                return "".join(f"{printable(line)}\n" for line in (await answer.text()).splitlines()), False
-            told = await answer.json()
+                return "".join(f"{printable(line)}\n" for line in body.decode().splitlines()), False
+            told = json.loads(body)
             if not isinstance(told, dict) or not all(isinstance(told.get(key), kind) for key, kind in _TOLD.items()):
                 raise refusal(f"{address} answers as no run does", hint)
             return _told(told), bool(told.get("refused"))
@@ -265,6 +271,16 @@ async def ask(address: str, command: str, said: dict[str, str], caller: Caller) 
         raise unreached(
             address, error, has_authority=caller.has_authority, has_certificate=caller.has_certificate
         ) from None
+
+
+async def _whole(answer: aiohttp.ClientResponse) -> bytes:
+    """The body of an answer; raises `ValueError` where it is longer than any run has to tell."""
+    body = bytearray()
+    async for some in answer.content.iter_any():
+        body += some
+        if len(body) > _ANSWER_BYTES_MAX:
+            raise ValueError("the answer has no end")
+    return bytes(body)
 
 
 def _told(answer: dict[str, Any]) -> str:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import ssl
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -25,7 +26,7 @@ def refused(
     *,
     answer: object = None,
     scheme: str = "",
-    serve: Callable[[asyncio.StreamReader, asyncio.StreamWriter], None] | None = None,
+    serve: Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None] | None] | None = None,
 ) -> str:
     """What an operator is told who asks a server for the situation."""
 
@@ -108,6 +109,21 @@ def test_what_answers_and_is_no_run_is_told_so() -> None:
         writer.write(b"SSH-2.0-sshd\r\n")
 
     assert refused(Caller("x"), serve=greet).startswith("cannot be reached: what answers there is no run")
+
+
+def test_an_answer_without_an_end_is_not_taken_to_its_end() -> None:
+    sent = list[int]()
+
+    async def flood(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writer.write(b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\n\r\n")
+        with suppress(ConnectionError):
+            while len(sent) < 1024:
+                writer.write(b" " * 2**20)
+                await writer.drain()
+                sent.append(2**20)
+
+    assert refused(Caller("x"), serve=flood).startswith("cannot be reached: what answers there is no run")
+    assert 16 * 2**20 < sum(sent) < 64 * 2**20
 
 
 def test_what_answers_does_not_command_the_terminal_of_who_asks() -> None:
