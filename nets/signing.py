@@ -148,9 +148,6 @@ def _record(at: Path) -> SignaturesRecord:
 
 def _secret(path: str | Path) -> Ed25519PrivateKey:
     data = read_bytes(path, _SIZE_BYTES_MAX)
-    if is_open_to_all(path):
-        hint = f"make another one, where somebody may have done that; else `chmod o-rw {printable(str(path))}`"
-        raise _refusal("F5026", path, "everybody on this host can read this key, or change it", hint)
     try:
         key = serialization.load_pem_private_key(data, password=None)
     except TypeError:  # what the library says of a key with a passphrase
@@ -162,6 +159,9 @@ def _secret(path: str | Path) -> Ed25519PrivateKey:
         raise _refusal("F5024", path, "this is no secret key", hint) from None
     if not isinstance(key, Ed25519PrivateKey):
         raise _refusal("F5024", path, "this is a key of another kind than Ed25519", "make one of that kind")
+    if is_open_to_all(path):
+        hint = f"make another one, where somebody may have done that; else `chmod o-rw {printable(str(path))}`"
+        raise _refusal("F5026", path, "everybody on this host can read this key, or change it", hint)
     return key
 
 

@@ -270,7 +270,7 @@ def test_diagram_that_is_not_found_in_time_is_what_the_bound_tells(monkeypatch: 
 
 def test_diagram_that_is_too_large_asks_for_memory_and_not_for_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(exploring, "FIRST_MARKINGS", 50)
-    found = explore_protocol(load_net("ring"), limits=Limits(memory_bytes=2**16))
+    found = explore_protocol(load_net("ring"), limits=Limits(memory_bytes=2**14))
     assert {(verdict.status, verdict.hint) for verdict in found.safety} == {(Status.UNKNOWN, exploring.MORE_MEMORY)}
 
 
