@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Final
 
 from firable.executor.operating import ending, stopping
 from firable.nets.verdict import counted
+from firable.semantics.joining import APPLIED, STANDS, VOTED
 from firable.semantics.trace import Event, Fired, Noted
 
 if TYPE_CHECKING:
@@ -76,7 +77,8 @@ class Circling:
 
     def seen(self, event: Event) -> None:
         """Take an event of the trace."""
-        if isinstance(event, Fired | Noted):
+        is_vote = isinstance(event, Noted) and event.note in (VOTED, STANDS, APPLIED)
+        if isinstance(event, Fired | Noted) and not is_vote:  # whoever sees a key first may vote at each of its turns
             self.hoped_from_seconds = event.at_seconds
         if not isinstance(event, Fired):
             return

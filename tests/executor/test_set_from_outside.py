@@ -216,6 +216,39 @@ def test_a_run_that_nobody_can_help_ends_though_the_key_is_turned_on_and_on() ->
     assert "press.barred" in str(report.situation.blocked)
 
 
+SEEN_TWICE = """firable: 1
+cell: press
+controllers:
+  press:
+    start: ready
+    inputs: [key, part]
+    places:
+      ready:
+      working: {send: {machine: P, command: WORK}, until: worked}
+  lamp: {start: dark, inputs: key, places: {dark: , lit: }}
+transitions:
+  work: {from: [press.ready, lamp.dark], to: [press.working, lamp.lit], if: press.key, unless: lamp.key}
+"""
+
+
+class Bounded(io.StringIO):
+    """A trace of a run that ends."""
+
+    def write(self, text: str) -> int:
+        assert self.tell() < 100_000, "the run is endless"
+        return super().write(text)
+
+
+def test_a_vote_that_fails_at_each_turn_of_a_key_puts_off_no_end() -> None:
+    """Of the two who see it one is told first, so that there is a round each time, in which the other says no."""
+    door = "press.door: {set_by: door, after_s: 7, for_s: 2}"
+    trace = Bounded()
+    report = ran(SEEN_TWICE, parse_plant(PLANT.replace(door, f"lamp.key:  {KEY}")), trace)
+    assert trace.getvalue().count('"note": "voted"') > 20
+    assert report.state is State.WAITING
+    assert report.simulated_seconds < 100
+
+
 def test_a_run_is_at_rest_for_its_operator_only_when_nobody_comes_any_more() -> None:
     stepped: list[tuple[str, float]] = []
 
