@@ -56,6 +56,10 @@ GOOD: Final = 0.9
 _AGREE: Final = 1e-9
 """How far two sensors may be apart that say how often: 1 - 0.3 is not 0.7."""
 
+SWITCHED_SECONDS_MIN: Final = 0.001
+"""So long at least a signal that is set from outside again and again stays what it is: each change costs a simulated
+run as much as any, and a time that is lost when it is added to the run's is none."""
+
 
 class _Model(BaseModel):
     model_config = ConfigDict(defer_build=True, extra="forbid", strict=True, frozen=True, populate_by_name=False)
@@ -388,9 +392,10 @@ def _inconsistencies(model: PlantModel) -> Iterator[tuple[Path, str, str]]:
             yield ("sensors", name, "after_s"), "a sensor sees at once", hint
         if sensor.for_s is not None and sensor.set_by is None:
             yield ("sensors", name, "for_s"), "nobody sets this sensor", "`for_s` belongs to `set_by`"
-        elif sensor.for_s is not None and not (sensor.for_s and sensor.after_s):
-            hint = "give `for_s` and `after_s` more than 0 s, or leave out `for_s`: then it stays 1"
-            yield ("sensors", name, "for_s"), "it would change again and again, and no time would pass", hint
+        elif sensor.for_s is not None and min(sensor.for_s, sensor.after_s) < SWITCHED_SECONDS_MIN:
+            least = f"at least {SWITCHED_SECONDS_MIN:g} s"
+            hint = f"give `for_s` and `after_s` {least}, or leave out `for_s`: then it stays 1"
+            yield ("sensors", name, "for_s"), "it would change again and again, and hardly any time would pass", hint
         for where, at in (("occupied", sensor.occupied), ("passes", sensor.passes), ("fails", sensor.fails)):
             yield from station(("sensors", name, where), at)
         for key, machine_seen in (("holding", sensor.holding), ("acknowledges", sensor.acknowledges)):
