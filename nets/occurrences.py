@@ -376,9 +376,11 @@ class Names:
     def _letters(self, scalar: Scalar) -> Iterator[tuple[int, int] | None]:
         """Line and column of each letter of a scalar over several lines, whose ends and indents it has as blanks.
 
-        None for a blank; they end where the text has something else, as an escape between quotes is.
+        None for a blank; they end where the text has something else, as an escape between quotes is, but for one of a
+        line end or of a blank.
         """
         lines, row, column = self.source.lines, scalar.line - 1, scalar.column - 1
+        escapes = {"\\", "\\ "} if lines[row][column : column + 1] == '"' else set()
         if not scalar.plain:
             row, column = (row + 1, 0) if lines[row][column] in "|>" else (row, column + 1)
         is_blank = True
@@ -389,8 +391,9 @@ class Names:
                 continue
             while is_blank and row < len(lines):
                 column += len(lines[row][column:]) - len(lines[row][column:].lstrip())
-                if is_blank := column == len(lines[row]):
-                    row, column = row + 1, 0
+                here = lines[row][column : column + 2]
+                if is_blank := not here or here in escapes:
+                    row, column = (row, column + 2) if here == "\\ " else (row + 1, 0)
             if row == len(lines) or lines[row][column : column + 1] != letter:
                 return
             column += 1

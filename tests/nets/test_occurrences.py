@@ -232,6 +232,7 @@ def test_a_word_that_is_quoted_or_part_of_a_formula_is_found_where_it_stands() -
         "q and\n      not (@\n\n      and q->@)",
         "'q and\n      not (@ and q->@)'",
         '"q and\n\n      not (@ and q->@)"',
+        '"q and \\\n      not (@ and\\\n      \\ q->@)"',
         ">-\n      q and\n      not (@ and\n\n      q->@)",
         "|  # said twice: p\n      q and\n        not (@\n      and q->@)\n",
     ],
