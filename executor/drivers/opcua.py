@@ -305,7 +305,8 @@ class OpcUaConnection(Stepwise):
         last = number if tells else number - 1
         if self.number is not None and last > self.number + tells:
             self.told.put_nowait(LinkError("what the server has told was lost, or is what nobody can read"))
-        self.number = max(last, self.number or 0)
+        is_over = self.number == _NUMBER_MAX and tells  # it begins again at 1
+        self.number = last if is_over else max(last, self.number or 0)
 
     @property
     def _transport(self) -> asyncio.Transport | None:

@@ -169,6 +169,8 @@ class TestOpcUa(DriverConformance):
         ("1 1- 2 2- 2- 3", False),
         ("7 8 8 0-", False),
         ("4294967295 1 2", False),
+        ("4294967295 1- 1 2- 2", False),
+        ("4294967295 1 3", True),
         ("1 3", True),
         ("1- 2", True),
         ("1 2- 3-", True),
