@@ -229,7 +229,7 @@ class OpcUaConnection(Stepwise):
 
     def _counts(self, every_s: float) -> tuple[int, int]:
         """After how many intervals the server may drop the subscription, and is to say that it is there (Part 4)."""
-        signs = max(1, int(self.wanted.timeout_s / SIGNS / max(0.001, every_s)))
+        signs = max(1, int(self.wanted.timeout_s / SIGNS / max(0.001, every_s)))  # in this order: it may be NaN
         return max(10_000, 3 * signs), signs
 
     async def read(self) -> Sequence[tuple[Point, Value]]:
