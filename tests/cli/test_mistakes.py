@@ -166,59 +166,48 @@ def test_a_wrong_command_line_says_what_is_wrong(
     assert words.lower() in refused(capsys, *arguments).lower()
 
 
+EMPTY = [
+    (["check", ""], "NET..."),
+    (["check", "catalogue:conceptual_one_robot", ""], "NET..."),
+    (["check", "catalogue:one_robot_mc_late", "--trace-dir", ""], "--trace-dir"),
+    (["check", "catalogue:one_robot", "--evidence", ""], "--evidence"),
+    (["draw", "catalogue:one_robot", "-o", ""], "-o"),
+    (["prove", "catalogue:one_robot", "--smt-dir", ""], "--smt-dir"),
+    (["run", "cell.bundle", "--trace", ""], "--trace"),
+    (["run", "cell.bundle", "--journal", ""], "--journal"),
+    (["run", "cell.bundle", "--serve-tls", "cert.pem", ""], "--serve-tls"),
+    (["sign", "--make-key", ""], "--make-key"),
+    (["split", "catalogue:one_robot", "--subnets", ""], "--subnets"),
+    (["takeover", "old.bundle", "new.bundle", "--journal", "", "--into", "b"], "--journal"),
+]
+TWICE = [
+    (["rehearse", "cell.bundle", "--seed", "1", "--seed", "2"], "--seed"),
+    (["check", "catalogue:one_robot", "--method", "auto", "--method=symbolic"], "--method"),
+    (["check", "catalogue:one_robot", "--progress", "--no-progress"], "--progress"),
+    (["draw", "catalogue:one_robot", "-o", "a.svg", "--output", "b.svg"], "-o"),
+    (["ci", "init", "--for", "gitlab", "--for", "gitlab"], "--for"),
+]
+
+
 @pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        (["check", ""], "NET..."),
-        (["check", "catalogue:conceptual_one_robot", ""], "NET..."),
-        (["check", "catalogue:one_robot_mc_late", "--trace-dir", ""], "--trace-dir"),
-        (["check", "catalogue:one_robot", "--evidence", ""], "--evidence"),
-        (["draw", "catalogue:one_robot", "-o", ""], "-o"),
-        (["prove", "catalogue:one_robot", "--smt-dir", ""], "--smt-dir"),
-        (["run", "cell.bundle", "--trace", ""], "--trace"),
-        (["run", "cell.bundle", "--journal", ""], "--journal"),
-        (["run", "cell.bundle", "--serve-tls", "cert.pem", ""], "--serve-tls"),
-        (["sign", "--make-key", ""], "--make-key"),
-        (["split", "catalogue:one_robot", "--subnets", ""], "--subnets"),
-        (["takeover", "old.bundle", "new.bundle", "--journal", "", "--into", "b"], "--journal"),
-    ],
+    ("arguments", "named", "why"),
+    [(*one, "it is empty") for one in EMPTY]
+    + [(*one, "it is given more than once, and has one value") for one in TWICE],
 )
-def test_an_empty_name_is_refused_and_never_the_folder_that_the_command_runs_in(
+def test_what_is_empty_or_of_one_value_and_given_twice_is_refused_and_never_taken_for_something_else(
     arguments: list[str],
     named: str,
+    why: str,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.chdir(tmp_path)
-    said = refused(capsys, *arguments)
-    assert f"Error: Invalid value for '{named}'" in said
-    assert said.endswith(": it is empty\n")
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        (["rehearse", "cell.bundle", "--seed", "1", "--seed", "2"], "--seed"),
-        (["check", "catalogue:one_robot", "--method", "auto", "--method=symbolic"], "--method"),
-        (["check", "catalogue:one_robot", "--progress", "--no-progress"], "--progress"),
-        (["draw", "catalogue:one_robot", "-o", "a.svg", "--output", "b.svg"], "-o"),
-        (["ci", "init", "--for", "gitlab", "--for", "gitlab"], "--for"),
-    ],
-)
-def test_an_option_of_one_value_that_is_given_twice_is_refused_and_none_of_them_is_taken(
-    arguments: list[str],
-    named: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    """An empty name would be the folder in which the command runs, and of two values the last was taken."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "cell.bundle").touch()
     said = refused(capsys, *arguments)
     assert f"Error: Invalid value for '{named}'" in said
-    assert said.endswith(": it is given more than once, and has one value\n")
+    assert said.endswith(f": {why}\n")
     assert [path.name for path in tmp_path.iterdir()] == ["cell.bundle"]
 
 
