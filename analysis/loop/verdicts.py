@@ -120,7 +120,7 @@ def check_loop(
     >>> from firable.nets.catalogue import catalogue_net, catalogue_plant
     >>> report = check_loop(catalogue_net("one_robot"), catalogue_plant("one_robot"))
     >>> report.closed.figures.markings, str(report.status), any(one.differs for one in report.differences)
-    (903, 'proved', False)
+    (746, 'proved', False)
     """
     asked = ask_loop(net, model, budget, progress=progress, interrupted=interrupted)
     unclear = (_not_asked(of) for of in net.properties if _unclear(model, of))

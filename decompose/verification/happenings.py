@@ -23,6 +23,7 @@ place waits until then.
     S/pressed, S/released            a key;     S/set, S/reset   what somebody outside the cell sets
     S/over             a time limit that somebody reads
     S/told             a controller is told of a signal that has changed some moment before
+    M/started          all is told, and a machine that was given its command before is still at it
 
 Rejected: an explored comparison with the simulated cell, which is exact about times and cannot say that nothing is
 left out.
@@ -64,23 +65,32 @@ class Plant(Things):
         Raises `DiffersError` where two have one name: the one would stand for the other in all that is asked.
         """
         found: dict[str, Happens] = {}
-        by_the_cell = ((name, partial(self.is_news, happens)) for name, happens in self._in_the_cell())
-        by_the_plant = ((name, partial(self.once_all_is_told, happens)) for name, happens in self._in_the_plant())
-        for name, happens in (*by_the_cell, *by_the_plant):
+        by_commands = ((name, partial(self.is_news, *what)) for name, what in self._by_commands())
+        by_themselves = ((name, partial(self.is_news, happens, [])) for name, happens in self._by_themselves())
+        for name, happens in (*by_commands, *by_themselves):
             if name in found:
                 raise DiffersError(f"two things that happen are called '{name}'")
             found[name] = happens
         return found
 
-    def _in_the_cell(self) -> Iterator[tuple[str, Happens]]:
+    def _by_commands(self) -> Iterator[tuple[str, tuple[Happens, list[Place]]]]:
+        """What happens as commands are sent, or done, with their places."""
         for t in self.net.transitions:
-            yield t.name, partial(self.fires, t)
+            sent = [place for place in self.commanding if place.name in t.outputs and self.sending is Sending.AT_ONCE]
+            yield t.name, (partial(self.fires, t), sent)
         for place in self.commanding if self.sending is Sending.LATE else ():
-            yield f"sent/{place.name}", partial(self.sent_late, place)
+            yield f"sent/{place.name}", (partial(self.sent_late, place), [place])
+        for place in self.commanding:
+            if place.name not in self.stops:
+                yield f"{self.machine_of(place)}/done/{place.name}", (partial(self.done, place), [place])
+
+    def _by_themselves(self) -> Iterator[tuple[str, Happens]]:
         for timer in self.timers:
             yield f"{timer}/over", partial(self.over, timer)
         for name in self.late:
             yield f"{name}/told", partial(self.told, name)
+        for name in self.may_start:
+            yield f"{name}/started", partial(self.started, name)
         for name, sensor in self.model.sensors.items():
             ways: dict[str, Happens] = {}
             if sensor.acknowledges is not None:
@@ -91,11 +101,8 @@ class Plant(Things):
             ways |= {way: partial(self.wavers, name, way) for way in flickers}
             ways |= {"clears": partial(self.wavers, name, "clears")} if sensor.may_linger else {}
             yield from ((f"{name}/{way}", partial(self.once_it_is_told, name, does)) for way, does in ways.items())
-
-    def _in_the_plant(self) -> Iterator[tuple[str, Happens]]:
         for place in self.commanding:
             if place.name not in self.stops:
-                yield f"{self.machine_of(place)}/done/{place.name}", partial(self.done, place)
                 yield f"{self.machine_of(place)}/accident/{place.name}", partial(self.spoils, place)
         for name in self.model.machines:
             for place in self.may_break_off(name):
@@ -113,11 +120,6 @@ class Plant(Things):
         for station in sorted(self.judged):
             yield f"{station}/judged", partial(self.judges, station)
 
-    def once_all_is_told(self, happens: Happens, state: State) -> Iterator[Changes]:
-        """Nothing happens at the machines while a controller is still to be told of what has."""
-        if not any(state[f"news of {name}"] for name in self.late):
-            yield from self.is_news(happens, state)
-
     def once_it_is_told(self, name: str, happens: Happens, state: State) -> Iterator[Changes]:
         """Nobody outside, and no sensor by itself, waits until a controller is told of anything but this very signal.
 
@@ -126,21 +128,49 @@ class Plant(Things):
         if name in self.sensed or name not in self.late or not state[f"news of {name}"]:
             yield from happens(state)
 
-    def is_news(self, happens: Happens, state: State) -> Iterator[Changes]:
+    def is_news(self, happens: Happens, places: list[Place], state: State) -> Iterator[Changes]:
         """What happens, with what controllers are told of it at once, and what is news to them."""
         for changes in happens(state):
             if ACCIDENT in changes or OVERRUN in changes:
                 yield changes
-            else:
-                yield from self.told_at_once(changes, state)
+                continue
+            for told in self.told_at_once(changes, places, state):
+                yield told | self.starts(told, state)
 
-    def told_at_once(self, changes: Changes, state: State) -> Iterator[Changes]:
+    def starts(self, changes: Changes, state: State) -> Changes:
+        """A machine that is given a command while there is news is starting, but one that is stopped at once, or done,
+        is not."""
+        given = [name for name in self.may_start if f"at {name}" in changes]
+        return {
+            f"starting {name}": changes[f"at {name}"] is not None and self.is_any_news(changes, state) for name in given
+        }
+
+    def is_any_news(self, changes: Changes, state: State) -> bool:
+        """Whether after some changes a controller is still to be told of something."""
+        after = _Overlaid(changes, state)
+        return any(after[f"news of {name}"] for name in self.late)
+
+    def started(self, machine: str, state: State) -> Iterator[Changes]:
+        """A machine is at its command still when all is told."""
+        if state[f"starting {machine}"] and not self.is_any_news({}, state):
+            yield {f"starting {machine}": False}
+
+    def is_still_to_be_told(self, machine: str, state: State) -> bool:
+        """Whether a controller is still to be told of what was so before a machine was given its command, or of a key
+        that the command has released: a signal takes less time than any command."""
+        if machine in self.may_start and state[f"starting {machine}"]:
+            return True
+        keys = [name for name in self.late if name in self.model.sensors]
+        return any(self.model.sensors[name].acknowledges == machine and state[f"news of {name}"] for name in keys)
+
+    def told_at_once(self, changes: Changes, places: list[Place], state: State) -> Iterator[Changes]:
         """Of what closes a gate a controller may be told later; it clears completions by itself."""
         after = _Overlaid(changes, state)
         touched = [name for name, thing in self.truths.items() if thing in changes]
         values = ((name, self.is_true(name, after), self.is_true(name, state)) for name in touched)
         new = {name: now for name, now, was in values if now != was}
-        late = self.told_late([(name, value) for name, value in new.items() if value or name not in self.completions])
+        closing = [(name, value) for name, value in new.items() if value or name not in self.completions]
+        late = self.told_late(closing, places)
         if not late <= {*self.late}:
             raise DiffersError(f"{', '.join(sorted(late - {*self.late}))} may be told late, and was not expected to be")
         ways: list[Changes] = [{}]
@@ -152,16 +182,15 @@ class Plant(Things):
                 over: list[Changes] = [{news: False}] if is_known else []
                 ways = [{**way, **one} for way in ways for one in (*stay, *over)]
             elif name in late:
-                ways = [{**way, news: True} for way in ways]
+                at_once: list[Changes] = [{told: new[name]}] if late == {name} & {*self.completions} else []
+                ways = [{**way, **one} for way in ways for one in ({news: True}, *(at_once if not is_known else ()))]
             else:  # what is no news is known
                 ways = [{**way, told: new[name]} for way in ways if not is_known]
         yield from (changes | way for way in ways)
 
     def told(self, name: str, state: State) -> Iterator[Changes]:
-        """A controller is told of a signal that has changed, of a completion when the sensors have been told."""
-        if name in self.completions and any(
-            state[f"news of {one}"] for one in self.late if one not in self.completions
-        ):
+        """A controller is told of a signal that has changed, of a completion behind what sensors show of it."""
+        if any(state[f"news of {one}"] for one in self.told_before.get(name, ())):
             return
         if not state[f"news of {name}"]:
             return
@@ -259,6 +288,12 @@ class Plant(Things):
             return
         if self.has_failed(name, state) and not isinstance(self.action(place), Stop):
             return
+        if self.is_still_to_be_told(name, state):
+            return
+        if isinstance(self.action(place), Stop) and place.completion is not None:
+            broken_off = {signal for one in self.may_break_off(name) for signal, _ in self.shows_done(one)}
+            if any(state[f"news of {signal}"] for signal in self.late if signal in broken_off):
+                return  # what was done after all is seen when the machine says that it is at rest
         for effect in self.effect(place, state):
             for seen in self.sensors_see(effect, state):
                 changes: Changes = {f"at {name}": None, **effect, **seen}
@@ -305,8 +340,11 @@ class Plant(Things):
         return changes | {f"judged {station}": None for station in stations & self.judged}
 
     def judges(self, station: str, state: State) -> Iterator[Changes]:
-        """A workpiece that lies there, and was not judged, is good or bad."""
+        """A workpiece that lies there, and was not judged, is good or bad, once it is told that it lies there."""
         judged = f"judged {station}"
+        sees = [name for name in self.late if name in self.model.sensors]
+        if any(self.model.sensors[name].occupied == station and state[f"news of {name}"] for name in sees):
+            return
         if state[f"has {station}"] is not None and state[judged] is None:
             yield {judged: GOOD}
             yield {judged: BAD}
@@ -315,7 +353,7 @@ class Plant(Things):
         """What a machine is at ends in an accident."""
         name, action = self.machine_of(place), self.action(place)
         at_work = state[f"at {name}"] == place.name and not self.has_failed(name, state)
-        if at_work and self.goes_wrong(name, action, place, state):
+        if at_work and not self.is_still_to_be_told(name, state) and self.goes_wrong(name, action, place, state):
             yield {f"at {name}": None, ACCIDENT: True}
 
     def still_done(self, place: Place, state: State) -> Iterator[Changes]:
@@ -401,7 +439,9 @@ class Plant(Things):
         yield from ways
 
     def comes_to_be_shown(self, name: str, state: State) -> Iterator[Changes]:
-        """The sensor of a completion that is acknowledged shows it."""
+        """The sensor of a completion that is acknowledged shows it, when the others have been told."""
+        if any(state[f"news of {one}"] for one in self.told_before[name]):
+            return
         if state[f"acknowledged {name}"] and not state[f"signal {name}"] and self.seen(name, state):
             yield {f"acknowledged {name}": False, f"signal {name}": True}
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
+from firable.nets.machines.excluding import with_one_token
 from firable.nets.machines.loop import Faults, Sending
 from firable.nets.machines.plant_file import (
     Action,
@@ -28,7 +29,7 @@ from firable.nets.machines.plant_file import (
     Stop,
     Work,
 )
-from firable.nets.net import Net, Place, SignalKind
+from firable.nets.net import Net, Place, SignalKind, Transition
 
 ACCIDENT: Final = "accident"
 OVERRUN: Final = "overrun"
@@ -80,6 +81,7 @@ class Things:
                 found[f"bit {name}"] = {True: f"plant.{name}.sensor" if name in self.completions else name}
         found |= {f"told {name}": {True: f"plant.{name}.told_1", False: f"plant.{name}.told_0"} for name in self.late}
         found |= {f"news of {name}": {True: f"plant.{name}.news"} for name in self.late}
+        found |= {f"starting {name}": {True: f"plant.{name}.starting"} for name in self.may_start}
         found |= {f"acknowledged {name}": {True: f"plant.{name}.acknowledged"} for name in self.sensed}
         if self.sending is Sending.LATE:
             found |= {f"unsent {p.name}": {True: f"plant.unsent.{p.name}"} for p in self.commanding}
@@ -138,29 +140,36 @@ class Things:
                 for lies in ([state[has]] if has in state else self.values(has))
                 for value in ([None] if lies is None else self.values(thing))
             ]
-        if not thing.startswith("breaks off "):
+        if not thing.startswith(("breaks off ", "starting ")):
             return [{thing: value} for value in self.values(thing)]
-        at = thing.replace("breaks off ", "at ", 1)
+        kind, _, machine = thing.rpartition(" ")
+        at = f"at {machine}"
+        at_rest = [False] if kind == "starting" else [None]
         return [
             {at: now_at, thing: value}
             for now_at in ([state[at]] if at in state else self.values(at))
-            for value in (self.values(thing) if self.comes_to_rest(now_at) else [None])
+            for value in (
+                at_rest
+                if now_at is None or not (kind == "starting" or self.comes_to_rest(now_at))
+                else self.values(thing)
+            )
         ]
 
     def assert_exists(self, state: State, changes: Mapping[str, Value]) -> None:
-        """What has changed has one of its values; nothing is broken off but by a machine at a stop, and nothing is
-        judged where nothing lies.
+        """What has changed has one of its values; nothing is broken off but by a machine at a stop, no machine is
+        starting but at a command, and nothing is judged where nothing lies.
 
         Raises `DiffersError` where it is not so: no state is compared in which it is not.
         """
         if stray := next((thing for thing, value in changes.items() if value not in self.values(thing)), None):
             raise DiffersError(f"'{stray}' becomes {changes[stray]}, which it never is")
         for machine in self.model.machines:
-            at, breaks = f"at {machine}", f"breaks off {machine}"
-            if breaks not in self.things or changes.keys().isdisjoint((at, breaks)):
-                continue
-            if state[breaks] is not None and not self.comes_to_rest(state[at]):
+            at, breaks, starting = f"at {machine}", f"breaks off {machine}", f"starting {machine}"
+            asked = {thing for thing in (breaks, starting) if thing in self.things and {thing, at} & changes.keys()}
+            if breaks in asked and state[breaks] is not None and not self.comes_to_rest(state[at]):
                 raise DiffersError(f"{machine} breaks off the command of '{state[breaks]}', and is at no stop")
+            if starting in asked and state[starting] and state[at] is None:
+                raise DiffersError(f"{machine} is starting, and is at no command")
         for station in self.model.stations:
             has, judged = f"has {station}", f"judged {station}"
             if judged not in self.things or changes.keys().isdisjoint((has, judged)):
@@ -279,40 +288,120 @@ class Things:
     @cached_property
     def late(self) -> tuple[str, ...]:
         """The signals that a controller may be told later than they change."""
-        late = {signal for changes in self.changing_together() for signal in self.told_late(changes)}
-        alone = (signal.name for signal in self.net.signals if signal.kind is SignalKind.SENSOR)
-        late |= {signal for signal in alone for value in (True, False) if self.told_late([(signal, value)])}
+        late = {signal for instant in self.instants() for signal in self.told_late(*instant)}
         return tuple(signal.name for signal in self.net.signals if signal.name in late)
+
+    @cached_property
+    def may_start(self) -> tuple[str, ...]:
+        """The machines that may be at a command which they were given while a controller was still to be told of
+        something, in the order of the plant file."""
+        some = {self.machine_of(place) for place in self.commanding if place.name not in self.stops}
+        return tuple(name for name in self.model.machines if self.late and name in some)
 
     @cached_property
     def read(self) -> set[tuple[str, bool]]:
         """The signals that some gate reads, each with the value that it wants."""
         return {(gate.signal, gate.wanted) for t in self.net.transitions for gate in t.external}
 
-    def told_late(self, changes: Collection[tuple[str, bool]]) -> set[str]:
-        """Of signals that change to these values: where a gate may be open by one's old value; then the completion,
-        too, which is told when nothing is news of what sensors show. None where no sensor is among them."""
-        if all(signal in self.completions for signal, _ in changes):
-            return set()
-        late = {signal for signal, value in changes if (signal, not value) in self.read}
+    def told_late(self, changes: Collection[tuple[str, bool]], places: Collection[Place] = ()) -> set[str]:
+        """Of signals that change to these values, those by whose old value a gate may be open, and somebody ready: not
+        one who cannot be before the completion of a command of `places` is told, which are sent then, or done. Then the
+        completion, too, which is told behind them."""
+        late = {
+            signal
+            for signal, value in changes
+            if (signal, not value) in self.read and not any(self.excludes(p, signal, not value) for p in places)
+        }
         return late | {signal for signal, _ in changes if late and signal in self.completions}
 
-    def changing_together(self) -> Iterator[list[tuple[str, bool]]]:
-        """The signals that change in one instant with a completion, and to what: where a workpiece goes, or is judged
-        no more."""
+    @cached_property
+    def told_before(self) -> dict[str, list[str]]:
+        """For each completion the sensors that may change with it: when a controller is told of it, it has been told of
+        them."""
+        found = {name: set[str]() for name in self.completions}
         for place in self.commanding:
-            if place.completion is None:
-                continue
-            name, action = self.machine_of(place), self.action(place)
-            together = [(place.completion, True)]
-            if isinstance(action, Carry):
-                together += self.seen_of(name, action.target)
-            elif isinstance(action, Process):
-                together += [(name, False) for name in self.judging(action.station)]
-            elif isinstance(action, Grasp | Put):
-                station = self.model.machines[name].positions[self.where(place, "at")]
-                together += self.seen_of(station, name) if isinstance(action, Grasp) else self.seen_of(name, station)
-            yield together
+            if place.completion is not None:
+                found[place.completion] |= {name for name, _ in self.shows_done(place)}
+        return {name: [one for one in self.late if one in seen] for name, seen in found.items()}
+
+    def instants(self) -> Iterator[tuple[list[tuple[str, bool]], list[Place]]]:
+        """The signals that change in one instant, and to what, with the place whose command is sent or done in it."""
+        for place in self.commanding:
+            if isinstance(action := self.action(place), Carry):
+                yield self.seen_of(action.source, self.machine_of(place)), [place]
+            effect = self.shows_done(place)
+            yield effect if place.completion is None else [(place.completion, True), *effect], [place]
+            if place in self.may_break_off(self.machine_of(place)):
+                yield effect, []
+        yield self.seen_of(None, self.model.arrivals.station), []
+        for out in self.model.departures:
+            yield self.seen_of(out.station, None), []
+        for name in self.sensed:
+            yield [(name, True)], []
+        for name in (signal.name for signal in self.net.signals if signal.kind is SignalKind.SENSOR):
+            sensor = self.model.sensors[name]
+            moves = sensor.acknowledges is not None or sensor.set_by is not None or sensor.may_flicker
+            for value in (True, False) if moves else (False,) if sensor.may_linger else ():
+                yield [(name, value)], []
+            if sensor.passes is not None or sensor.fails is not None:
+                yield [(name, True)], []
+
+    def shows_done(self, place: Place) -> list[tuple[str, bool]]:
+        """What sensors show at once of a command that is done: where a workpiece goes, or is judged no more."""
+        name, action = self.machine_of(place), self.action(place)
+        if isinstance(action, Carry):
+            return self.seen_of(name, action.target)
+        if isinstance(action, Process):
+            return [(name, False) for name in self.judging(action.station)]
+        if isinstance(action, Grasp | Put):
+            station = self.model.machines[name].positions[self.where(place, "at")]
+            return self.seen_of(station, name) if isinstance(action, Grasp) else self.seen_of(name, station)
+        return []
+
+    def excludes(self, place: Place, signal: str, value: bool) -> bool:
+        """Whether nobody who goes by this value of a signal is ready while a place holds its token, and it holds it
+        till the completion is told: all that takes it waits for that, and no other machine sets it."""
+        if (place.name, signal, value) not in self._excluded:
+            self._excluded[place.name, signal, value] = self._excludes(place, signal, value)
+        return self._excluded[place.name, signal, value]
+
+    @cached_property
+    def _excluded(self) -> dict[tuple[str, str, bool], bool]:
+        return {}
+
+    def _excludes(self, place: Place, signal: str, value: bool) -> bool:
+        completion = place.completion
+        if completion is None or any(
+            other.command is None or other.command.machine != self.machine_of(place)
+            for other in self.net.places
+            if other.completion == completion
+        ):
+            return False
+        takers = [t for t in self.net.transitions if place.name in t.inputs]
+        if any((completion, True) not in _gates(t) for t in takers):
+            return False
+        return all(self.is_kept_back(place, t, signal) for t in self.net.transitions if (signal, value) in _gates(t))
+
+    def is_kept_back(self, place: Place, t: Transition, signal: str) -> bool:
+        """Whether what a transition needs at the controller of a signal is missing while a place holds its token."""
+        owner = self.net.signal(signal).owner
+        mine = [name for name in (*t.inputs, *t.permissive) if self.net.place(name).owner == owner]
+        if place.owner == owner and place.name in (*t.outputs, *t.inhibitive):
+            return True
+        if place.name in mine:
+            return (str(place.completion), True) in _gates(t)
+        return any(self.apart(place.name, name) for name in mine)
+
+    def apart(self, one: str, other: str) -> bool:
+        """Whether two places are never marked together, by places among which there is one token for ever; what the
+        loop names for that is looked at anew."""
+        found = with_one_token(self.net, one, other)
+        if found is None:
+            return False
+        kept = all(len(found & {*t.inputs}) == len(found & {*t.outputs}) for t in self.net.transitions)
+        if not kept or not {one, other} <= found or sum(self.net.place(name).marked for name in found) != 1:
+            raise DiffersError(f"'{one}' and '{other}' may hold a token at once")
+        return True
 
     def seen_of(self, source: str | None, target: str | None) -> list[tuple[str, bool]]:
         """What sensors that are no completions show at once, of a workpiece that goes."""
@@ -371,6 +460,10 @@ class Things:
         if sensor.passes is not None or sensor.fails is not None:
             return state[f"judged {sensor.passes or sensor.fails}"] == (BAD if sensor.passes is None else GOOD)
         return state[target_of(sensor)] is not None
+
+
+def _gates(t: Transition) -> set[tuple[str, bool]]:
+    return {(gate.signal, gate.wanted) for gate in t.external}
 
 
 def target_of(sensor: Sensor) -> str:

@@ -31,7 +31,7 @@ begun.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 from types import MappingProxyType
@@ -257,7 +257,7 @@ class _Closing:
             (*((name, False) for name in transition.inputs), *((name, True) for name in transition.outputs)),
         )
         moments, ended = each(each([NOTHING], [own]), [self.applied(transition)]), list[Moment]()
-        commanded = set[str]()
+        commanded, taken = set[str](), list[Place]()
         # In the order of the net, as the executor sends what one firing commands.
         for name in sorted(transition.outputs, key=self.net.place_index.__getitem__):
             place = self.net.place(name)
@@ -267,9 +267,10 @@ class _Closing:
             ended += each(moments, self.laws.refused(place, again=place.command.machine in commanded))
             moments = each(moments, self.laws.sent(place))
             commanded.add(place.command.machine)
+            taken.append(place)
             if len(moments) + len(ended) > VARIANTS_MAX:
                 raise _too_many(transition)
-        for moment in chain.from_iterable(map(self.telling.of, chain.from_iterable(map(self.seen, moments)))):
+        for moment in self.told(moments, taken):
             yield moment.transition("/".join((transition.name, *moment.tags)), _told(transition, moment))
         for moment in ended:
             yield self.accident("/".join((transition.name, *moment.tags)), _told(transition, moment), moment)
@@ -313,7 +314,6 @@ class _Closing:
     def moves(self) -> Iterator[Transition]:
         """What machines, workpieces and sensors do by themselves."""
         calm = each([NOTHING], [Case(((ACCIDENT, False), (OVERRUN, False)))])
-        start = each(calm, [self.telling.all_told])
         for place in self.laws.commanding:
             if not self.laws.lasts(place):
                 continue
@@ -322,63 +322,66 @@ class _Closing:
             # A machine that has failed at a command still obeys a stop.
             may_hang = name in self.failed and not isinstance(self.laws.action(place), Stop)
             working = ((busy, True), (idle, False), *(((self.failed[name], False),) if may_hang else ()))
-            at_work = each(start, [Case(working, ((busy, False), (idle, True)))])
+            ends = Case(working, ((busy, False), (idle, True))).with_(self.telling.is_under_way(place))
+            at_work = each(calm, [ends])
             words = self.words(place)
             done = each(at_work, self.laws.done(place))
             done = [
                 one for moment in done for seen in self.seen(moment) for one in each([seen], self.formed(place, seen))
             ]
-            yield from self.named(f"{name}/done/{place.name}", f"{words} is done", done)
+            yield from self.named(f"{name}/done/{place.name}", f"{words} is done", done, [place])
             yield from self.ended(f"{name}/accident/{place.name}", each(at_work, self.laws.spoiled(place)))
             if place.name in self.failing:
                 others = tuple((failed, False) for other, failed in self.failed.items() if other != name)
                 failed = self.failed[name]
                 fails = Case((*working, *others), ((failed, True),))
-                yield from self.named(f"{name}/fails/{place.name}", f"{words} fails", each(start, [fails]))
+                yield from self.named(f"{name}/fails/{place.name}", f"{words} fails", each(calm, [fails]))
         for name, places in self.laws.may_break_off.items():
             for place in places:
-                yield from self.still_moves(name, place, start)
+                yield from self.still_moves(name, place, calm)
         for name, failed in self.failed.items() if self.repaired else ():
             repair = Case(((failed, True),), ((failed, False),))
-            yield from self.named(f"{name}/repaired", f"{name} is repaired and goes on", each(start, [repair]))
+            yield from self.named(f"{name}/repaired", f"{name} is repaired and goes on", each(calm, [repair]))
         for signal, waiting in self.acknowledged.items():
             shows = Case(((waiting, True), (signal, False), self.sensor(signal)), ((waiting, False), (signal, True)))
-            yield from self.named(f"{signal}/shown", f"the sensor of {signal} shows it", each(start, [shows]))
+            told = each(calm, [self.telling.is_told(*self.telling.behind.get(signal, ()))])
+            yield from self.named(f"{signal}/shown", f"the sensor of {signal} shows it", each(told, [shows]))
         yield from self.sent_late(calm)
         for name, words, ways in self.telling.moves():
             yield from self.named(name, words, each(calm, ways))
-        yield from self.workpieces(start)
+        yield from self.workpieces(calm)
         yield from self.unsteady(calm)
 
-    def still_moves(self, name: str, place: Place, start: list[Moment]) -> Iterator[Transition]:
+    def still_moves(self, name: str, place: Place, calm: list[Moment]) -> Iterator[Transition]:
         """What a machine breaks off may be done or end in its accident until it is at rest, unless it has failed."""
         works = Case(((self.failed[name], False),) if name in self.failed else ())
-        still = each(each(start, [works]), [self.laws.no_longer_broken_off(place)])
+        still = each(each(calm, [works]), [self.laws.no_longer_broken_off(place)])
         done = chain.from_iterable(map(self.seen, each(still, self.laws.done(place))))
         words = f"{self.words(place)} is still done, before {name} has come to rest"
         yield from self.named(f"{name}/still-done/{place.name}", words, done)
         yield from self.ended(f"{name}/still-accident/{place.name}", each(still, self.laws.spoiled(place)))
 
-    def sent_late(self, start: list[Moment]) -> Iterator[Transition]:
+    def sent_late(self, calm: list[Moment]) -> Iterator[Transition]:
         for name, unsent in self.unsent.items():
             place = self.net.place(name)
-            sending = each(start, [Case(((unsent, True),), ((unsent, False),))])
+            sending = each(calm, [Case(((unsent, True),), ((unsent, False),))])
             cleared = each(each(sending, self.cleared(place)), self.timed_anew(place))
-            sent = chain.from_iterable(map(self.seen, each(cleared, self.laws.sent(place))))
-            yield from self.named(f"sent/{name}", f"{self.words(place)} is sent", sent)
+            sent = self.told(each(cleared, self.laws.sent(place)), [place])
+            yield from _named(f"sent/{name}", f"{self.words(place)} is sent", sent)
             yield from self.ended(f"sent/{name}", each(cleared, self.laws.refused(place)))
 
-    def workpieces(self, start: list[Moment]) -> Iterator[Transition]:
+    def workpieces(self, calm: list[Moment]) -> Iterator[Transition]:
         entry = self.model.arrivals.station
-        arrived = chain.from_iterable(map(self.seen, each(start, [self.laws.arrives()])))
+        arrived = chain.from_iterable(map(self.seen, each(calm, [self.laws.arrives()])))
         yield from self.named(f"arrives/{entry}", f"a workpiece comes to {entry}", arrived)
         for departure in self.model.departures:
             exit_ = departure.station
-            gone = chain.from_iterable(map(self.seen, each(start, self.laws.departs(departure))))
+            gone = chain.from_iterable(map(self.seen, each(calm, self.laws.departs(departure))))
             yield from self.named(f"leaves/{exit_}", f"the workpiece on {exit_} is taken away", gone)
-            yield from self.ended(f"leaves/{exit_}", each(start, self.laws.departs_raw(departure)))
+            yield from self.ended(f"leaves/{exit_}", each(calm, self.laws.departs_raw(departure)))
         for station in self.model.stations:
-            judged = each(start, self.laws.judges(station)) if station in self.laws.judged else []
+            there = each(calm, [self.telling.is_seen(station)]) if station in self.laws.judged else []
+            judged = each(there, self.laws.judges(station))
             yield from self.named(f"{station}/judged", f"the workpiece on {station} is judged", judged)
 
     def unsteady(self, calm: list[Moment]) -> Iterator[Transition]:
@@ -424,9 +427,18 @@ class _Closing:
             words = f"the time of {place.name} is over, and {place.completion} has not come"
             yield from self.named(f"{timer}/over", words, each([NOTHING], [over]))
 
-    def named(self, name: str, description: str, moments: Iterable[Moment]) -> Iterator[Transition]:
-        for moment in chain.from_iterable(map(self.telling.of, moments)):
-            yield moment.transition("/".join((name, *moment.tags)), ", ".join((description, *moment.says)))
+    def told(self, moments: Iterable[Moment], taken: Sequence[Place]) -> Iterator[Moment]:
+        """Firings in which machines take the commands of some places, with what sensors see of it and controllers are
+        told."""
+        for moment in chain.from_iterable(map(self.seen, moments)):
+            for told in self.telling.of(moment, taken):
+                yield from self.telling.sent(told, taken)
+
+    def named(
+        self, name: str, description: str, moments: Iterable[Moment], done: Sequence[Place] = ()
+    ) -> Iterator[Transition]:
+        told = (one for moment in moments for one in self.telling.of(moment, done))
+        yield from _named(name, description, told)
 
     def ended(self, name: str, moments: Iterable[Moment]) -> Iterator[Transition]:
         for moment in moments:
@@ -475,6 +487,11 @@ class _Closing:
             elif name in self.acknowledged:  # it may linger, and need not: the completion is formed from what it shows
                 moments = each(moments, [Case(), replace(at_once, tag=f"{name}-clears")])
         return moments
+
+
+def _named(name: str, description: str, moments: Iterable[Moment]) -> Iterator[Transition]:
+    for moment in moments:
+        yield moment.transition("/".join((name, *moment.tags)), ", ".join((description, *moment.says)))
 
 
 def _told(transition: Transition, moment: Moment) -> str:

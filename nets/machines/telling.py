@@ -4,33 +4,40 @@ When a gripper closes, its hand is full, the station empty and the command done,
 shows that at once: a controller is told one signal, may fire, and is told the next. What it does in between is in no
 run in which all change together. So the loop has the moments in between: for a signal that is told *late* one place
 says what its controller was told last, by which its gates go, and another one that there is news of it. It is told in a
-firing of its own, sensors in any order and the completion behind them: when a machine says that it is done, what it did
-can be seen, but for a sensor that may linger. Meanwhile the cell may fire and send commands, and somebody outside may
-press a key or set a signal; nothing happens at the machines before all is told, since a signal takes less time than a
-machine.
+firing of its own, sensors in any order and the completion behind those that see what its machine does: when a machine
+says that it is done, or at rest, what it did can be seen, but for a sensor that may linger.
 
-A sensor that closes a gate is told late, also where nothing else changes, and completions behind it. What only opens
-gates is told in the instant itself: who fires later for it could have waited. So is a completion with which no sensor
-changes: it says that its machine was done some time ago.
+Meanwhile anything else may happen: the cell fires and sends commands, a workpiece comes, another machine gets done. But
+a signal takes less time than a command: while a machine is at one there is a moment at which all is told. So a machine
+that is given a command while there is news is *starting* until there is none, and does not get done before; nor before
+a key is told of that its command has released. Of what a stop breaks off nothing is assumed. And a camera takes longer
+to judge a workpiece than its controller to be told that it lies there.
+
+What closes a gate is told late, sensor or completion, also where nothing else changes, and a completion behind a sensor
+that does. What only opens gates is told in the instant itself: who fires later for it could have waited. So is what
+changes as a command is sent or done, where nobody who goes by the old value can be ready until the completion is told,
+which comes behind it (`excluding.py`).
 
 Rejected: to tell what closes a gate in the instant, too, where no sensor opens another one, as who fires before it is
 told could have fired before the instant. The instant can be a firing of the cell, where a conveyor takes its workpiece:
 who waits for the token that it leaves could not. And a command means something else before: a stop that comes when the
-hand has closed leaves nothing undone.
+hand has closed leaves nothing undone. For the same reason a completion is told late where no sensor changes with it: a
+time can be over when the hand has opened, and the stop leaves it open.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
 from typing import Final
 
+from firable.nets.machines.excluding import Excluding
 from firable.nets.machines.laws import Laws, fact
 from firable.nets.machines.loop import PLANT
 from firable.nets.machines.moment import Case, Literal, Moment, each
-from firable.nets.machines.plant_file import Carry, Grasp, Process, Put
+from firable.nets.machines.plant_file import Carry, Grasp, Process, Put, Stop
 from firable.nets.net import Place, SignalKind
 
 Change = tuple[str, bool]
@@ -62,37 +69,79 @@ class Telling:
     @cached_property
     def late(self) -> tuple[str, ...]:
         """The signals that are told late in some firing, in the order of the net."""
-        alone = ([(signal, value)] for signal in {*self.truth} - self.completions for value in (True, False))
-        found = frozenset[str]().union(*map(self.told_late, chain(alone, self._completed())))
+        by_commands = ((changes, (place,)) for place in self.laws.commanding for changes in self._by(place))
+        by_themselves = ((changes, ()) for changes in self._by_themselves())
+        found = frozenset[str]().union(*(self.told_late(*one) for one in chain(by_commands, by_themselves)))
         return tuple(signal.name for signal in self.laws.net.signals if signal.name in found)
 
-    def told_late(self, changes: Collection[Change]) -> frozenset[str]:
-        """Which of some signals that change together are told late: those that each close a gate, and completions
-        behind them; but a completion with which no sensor changes is told at once."""
-        changed = {signal for signal, _ in changes}
-        closing = {signal for signal, value in changes if (signal, not value) in self.wanted}
-        if not closing or changed <= self.completions:
-            return frozenset()
-        return frozenset(closing | changed & self.completions)
+    @cached_property
+    def excluding(self) -> Excluding:
+        """What cannot be ready until a controller is told that a command is done."""
+        return Excluding(self.laws)
 
-    def _completed(self) -> Iterator[list[Change]]:
-        """What changes together with each completion."""
+    def told_late(self, changes: Collection[Change], places: Collection[Place] = ()) -> frozenset[str]:
+        """Which of some signals that change together are told late: those that each close a gate, and completions
+        behind them. `places` are those whose commands are sent then, or the one whose command is done."""
+        closing = {
+            signal
+            for signal, value in changes
+            if (signal, not value) in self.wanted
+            and not any(self.excluding.excludes(place, signal, value=not value) for place in places)
+        }
+        behind = {signal for signal, _ in changes if closing and signal in self.completions}
+        return frozenset(closing | behind)
+
+    @cached_property
+    def behind(self) -> dict[str, tuple[str, ...]]:
+        """For each completion the sensors that may change with it, and that are told late: nothing of them is news when
+        it is told."""
+        found: dict[str, set[str]] = {}
         for place in self.laws.commanding:
-            if place.completion is None:
+            if place.completion is not None:
+                found.setdefault(place.completion, set()).update(signal for signal, _ in self._effect(place))
+        return {name: tuple(one for one in self.late if one in seen) for name, seen in found.items()}
+
+    def _by(self, place: Place) -> Iterator[list[Change]]:
+        """What changes together as the command of a place is sent, and as it is done."""
+        if isinstance(action := self.laws.action(place), Carry):
+            yield [*self._seen(action.source, self.laws.machine(place)[0])]
+        yield self._done(place)
+
+    def _done(self, place: Place) -> list[Change]:
+        """What changes together when a command is done."""
+        completed = [(place.completion, True)] if place.completion is not None else []
+        return [*completed, *self._effect(place)]
+
+    def _effect(self, place: Place) -> Iterator[Change]:
+        name, _ = self.laws.machine(place)
+        match self.laws.action(place):
+            case Grasp():
+                yield from self._seen(self.laws.station(place), name)
+            case Put():
+                yield from self._seen(name, self.laws.station(place))
+            case Carry(target=target):
+                yield from self._seen(name, target)
+            case Process(station=station):
+                yield from ((signal, False) for signal in self._judging(station))
+            case _:
+                return
+
+    def _by_themselves(self) -> Iterator[list[Change]]:
+        """What changes together with no command: a completion when its sensor shows it, what a machine that is stopped
+        still does, workpieces that come and go, cameras, keys, and sensors that are not exact."""
+        model = self.laws.model
+        yield from ([(name, True)] for name in self.completions if name in model.sensors)
+        yield from ([*self._effect(place)] for places in self.laws.may_break_off.values() for place in places)
+        yield [*self._seen(None, model.arrivals.station)]
+        yield from ([*self._seen(departure.station, None)] for departure in model.departures)
+        for signal in self.laws.net.signals:
+            sensor = model.sensors.get(signal.name)
+            if sensor is None or signal.name in self.completions:
                 continue
-            name, _ = self.laws.machine(place)
-            match self.laws.action(place):
-                case Grasp():
-                    seen = [*self._seen(self.laws.station(place), name)]
-                case Put():
-                    seen = [*self._seen(name, self.laws.station(place))]
-                case Carry(target=target):
-                    seen = [*self._seen(name, target)]
-                case Process(station=station):
-                    seen = [(signal, False) for signal in self._judging(station)]
-                case _:
-                    continue
-            yield [(place.completion, True), *seen]
+            if sensor.by_hand or sensor.may_flicker or sensor.judges is not None:
+                yield [(signal.name, True)]
+            if sensor.by_hand or sensor.may_flicker or sensor.may_linger:
+                yield [(signal.name, False)]
 
     def _seen(self, source: str | None, target: str | None) -> Iterator[Change]:
         """What sensors see at once of a workpiece that goes from one to the other."""
@@ -119,6 +168,13 @@ class Telling:
         """For each signal that may be told late the place that says that there is news of it."""
         return {signal: _news(signal) for signal in self.late}
 
+    @cached_property
+    def starting(self) -> dict[str, str]:
+        """For each machine the place that says that it is starting: that there was news when it was given the command
+        that it is at, and has been ever since. None where nothing is told late, or where it is only stopped at once."""
+        some = {self.laws.machine(place)[0] for place in self.laws.commanding if self.laws.lasts(place)}
+        return {name: f"{PLANT}.{name}.starting" for name in self.laws.model.machines if self.late and name in some}
+
     # --- Its places and firings
 
     def shown(self, signal: str) -> Literal:
@@ -130,9 +186,24 @@ class Telling:
         """No controller is still to be told anything."""
         return Case(tuple((news, False) for news in self.news.values()))
 
-    def is_told(self, signal: str) -> Case:
-        """The controller of a signal is still to be told nothing of it."""
-        return Case(((_news(signal), False),) if signal in self.late else ())
+    def is_under_way(self, place: Place) -> Case:
+        """The machine that is at the command of a place is no longer starting. Nothing is news of its keys, which the
+        command has released, nor of what sees what a stop has broken off, where the machine says that it is at rest."""
+        name, _ = self.laws.machine(place)
+        before = {key for key, sensor in self.laws.model.sensors.items() if sensor.acknowledges == name}
+        if isinstance(self.laws.action(place), Stop) and place.completion is not None:
+            broken_off = self.laws.may_break_off.get(name, ())
+            before |= {signal for one in broken_off for signal, _ in self._effect(one)}
+        starting = ((self.starting[name], False),) if name in self.starting else ()
+        return Case(starting).with_(self.is_told(*(signal for signal in self.late if signal in before)))
+
+    def is_told(self, *signals: str) -> Case:
+        """The controllers of some signals are still to be told nothing of them."""
+        return Case(tuple((_news(signal), False) for signal in signals if signal in self.late))
+
+    def is_seen(self, station: str) -> Case:
+        """Controllers are still to be told nothing of whether there is a workpiece on a station."""
+        return self.is_told(*(name for name, sensor in self.laws.model.sensors.items() if sensor.occupied == station))
 
     def places(self) -> Iterator[Place]:
         """What controllers were told of signals that are told late, and of which there is news."""
@@ -140,17 +211,19 @@ class Telling:
             yield fact(_told(signal), f"the controller was told that {signal} is 1")
             yield fact(_told(signal, value=False), f"the controller was told that {signal} is 0", marked=True)
             yield fact(_news(signal), f"{signal} has changed, and its controller is still to be told")
+        for name, starting in self.starting.items():
+            yield fact(starting, f"{name} was given its command while a controller was still to be told of something")
 
     def moves(self) -> Iterator[tuple[str, str, tuple[Case, ...]]]:
-        """For each signal that is told late the firing in which it is, its description, and its ways.
+        """For each signal that is told late the firing in which it is, its description, and its ways; for each machine
+        the one in which it is starting no more.
 
         There is news of what is as the controller knows it where it was different in between.
         """
         for signal in self.late:
             place, means = self.truth[signal]
             news = _news(signal)
-            before = [other for other in self.late if signal in self.completions and other not in self.completions]
-            wants = ((news, True), *((_news(other), False) for other in before))
+            wants = ((news, True), *((_news(other), False) for other in self.behind.get(signal, ())))
             ways = list[Case]()
             for value, word, was in ((True, "rises", "rose"), (False, "falls", "fell")):
                 is_so, is_not = (place, means == value), (place, means != value)
@@ -159,15 +232,23 @@ class Telling:
                 if signal not in self.completions:
                     ways.append(Case((*wants, is_not, *known), learns, was, f"{value:d} a moment ago"))
             yield f"{signal}/told", f"the controller is told of {signal}", tuple(ways)
+        for name, starting in self.starting.items():
+            started = self.all_told.with_(Case(((starting, True),), ((starting, False),)))
+            yield f"{name}/started", f"{name} is at its command, and all is told", (started,)
 
-    def of(self, moment: Moment) -> list[Moment]:
+    def of(self, moment: Moment, places: Collection[Place] = ()) -> list[Moment]:
         """A firing with what controllers are told of it in the firing itself; what is told late is news.
+
+        A completion that no sensor is told before is late or not, each time: what always is would be too late for every
+        time limit, in runs that are fair to all that fires here. `places` are those of `told_late`.
 
         Of what was news already, and changes back, there is nothing more to tell, or all of it still; but a completion
         that the controller clears before it was told of it is over.
         """
         changes = dict(self._changes(moment))
-        late = self.told_late([one for one in changes.items() if one[1] or one[0] not in self.completions])
+        late = self.told_late([one for one in changes.items() if one[1] or one[0] not in self.completions], places)
+        if not late <= {*self.late}:
+            raise RuntimeError(f"{', '.join(sorted(late - {*self.late}))} may be told late, and was not expected to be")
         moments = [moment]
         for signal, value in changes.items():
             if signal not in self.late:
@@ -175,12 +256,44 @@ class Telling:
             news = _news(signal)
             at_once = Case(((news, False), *_knows(signal, value=not value)), _knows(signal, value=value))
             later = Case(((news, False),), ((news, True),))
-            ways = [later if signal in late else at_once]
+            ways = [later] if signal in late else [at_once]
+            if late == {signal} and signal in self.completions:
+                ways = [at_once, replace(later, tag=f"{signal}-late")]
             ways.append(Case(((news, True), *_knows(signal, value=value)), ((news, False),), f"{signal}-untold"))
             if signal not in self.completions:
                 ways.append(Case(((news, True),), (), f"{signal}-{_STILL}"))
             moments = each(moments, ways)
         return moments
+
+    def sent(self, moment: Moment, places: Iterable[Place]) -> list[Moment]:
+        """A firing, with what controllers are told of it, in which machines take the commands of some places in turn.
+
+        A machine is starting where there is news then, but at a stop at once; at the command before it was, or was not.
+        """
+        moments = [moment]
+        for place in places:
+            name, _ = self.laws.machine(place)
+            if (starting := self.starting.get(name)) is None:
+                continue
+            moments = each(moments, [Case(((starting, False),)), *self._was_starting(name, moment)])
+            if self.laws.lasts(place):
+                moments = [after for one in moments for after in each([one], self._starts(starting, one))]
+        return moments
+
+    def _was_starting(self, name: str, moment: Moment) -> Iterator[Case]:
+        if not moment.before.get(self.laws.idle(name)):
+            yield Case(((self.starting[name], True),), ((self.starting[name], False),), f"{name}-starting")
+
+    def _starts(self, starting: str, moment: Moment) -> Iterator[Case]:
+        """There is news in the firing itself; or none at all, or of one signal first."""
+        if any(moment.after.get(news) for news in self.news.values()):
+            yield Case(((starting, False),), ((starting, True),))
+            return
+        yield self.all_told
+        before = list[Literal]()
+        for signal, news in self.news.items():
+            yield Case((*before, (news, True), (starting, False)), ((starting, True),), f"{signal}-is-news")
+            before.append((news, False))
 
     def _changes(self, moment: Moment) -> Iterator[Change]:
         for signal, (place, means) in self.truth.items():

@@ -43,7 +43,7 @@ def wrong_plant(tmp_path: Path) -> str:
 def test_the_loop_is_told_beside_the_net_with_gates_free(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", CELL, "--machines", PLANT]) == 0
     told = capsys.readouterr().out
-    assert "the loop has 101 places, 199 transitions, 903 markings and 2,218 edges" in told
+    assert "the loop has 92 places, 178 transitions, 746 markings and 1,976 edges" in told
     assert "  deadlock-free                       proved      proved\n" in told
     assert "✓ proved    fault.MC.repaired" in told
     assert told.endswith("all hold: 17 proved\n")
@@ -120,7 +120,7 @@ def test_the_loop_is_written_as_a_net_that_is_checked_like_any_other(
     assert told.count("as a net file") == 1
     assert main(["check", str(path), "--query", "AG not (plant.accident or plant.overrun)"]) == 1
     told = capsys.readouterr().out
-    assert "903 markings, 2,218 edges" in told
+    assert "746 markings, 1,976 edges" in told
     # The questions stand in it as properties, so that evidence of the answers can be had and checked.
     assert "✓ proved    property.loop.accident" in told
     assert "✓ proved    property.cell.restart" in told
@@ -299,7 +299,7 @@ def test_one_ctrl_c_ends_all_explorations_of_a_cell_with_its_machines(
     assert main(["check", CELL, "--machines", PLANT]) == 3
     assert len(begun) == 2, "of the loop, and of the net with gates free"
     told = capsys.readouterr().out
-    assert "903 markings and 2,218 edges\n  5 markings with gates free so far\n" in told
+    assert "746 markings and 1,976 edges\n  5 markings with gates free so far\n" in told
     assert "\n  interrupted\n" in told
     assert "  deadlock-free                       unknown     proved\n" in told
     assert "✓ proved    loop.deadlock-free" in told
@@ -342,7 +342,7 @@ def test_the_parts_of_what_is_asked_of_a_loop_are_told_by_name_to_who_asks_for_a
 def test_a_bundle_that_is_kept_back_by_how_many_markings_are_written_down_is_not_told_to_take_more_time(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(spaces, "MARKINGS_MAX", 500)  # those of the loop are 903
+    monkeypatch.setattr(spaces, "MARKINGS_MAX", 500)  # those of the loop are 746
     monkeypatch.setattr(spaces, "WIDE_MAX", 500)
     assert main(["bundle", CELL, "-o", str(tmp_path / "cell.bundle"), "--machines", PLANT]) == 2
     told = capsys.readouterr().err

@@ -100,50 +100,6 @@ def test_whatever_goes_on_such_a_signal_can_change_in_the_loop() -> None:
     assert loop().net.transition("press.key/set").description.startswith("press.key is set by operator")
 
 
-IN_BETWEEN = """firable: 1
-cell: carrying
-controllers:
-  belt:
-    start: [ready, looking]
-    inputs: [key, waits, carries, lies]
-    places:
-      ready:
-      running: {send: {machine: B, command: RUN}, until: carried}
-      still:
-      looking:
-      seen:
-      spinning: {send: {machine: M, command: SPIN}}
-transitions:
-  run:  {from: belt.ready, to: belt.running, if: belt.waits}
-  end:  {from: belt.running, to: belt.still}
-  see:  {from: belt.looking, to: belt.seen, if: [belt.carries, belt.lies], unless: belt.key}
-  spin: {from: belt.seen, to: belt.spinning, if: [belt.carries, belt.lies, belt.key]}
-"""
-CARRIED_ONCE = """firable_plant: 1
-plant: carrying
-stations: [entry, table]
-arrivals:   {station: entry, every_s: 5}
-departures: {station: table, raw: true}
-machines:
-  B: {commands: {RUN:  {does: carry, from: entry, to: table, takes_s: 1}}}
-  M: {commands: {SPIN: {does: process, station: table, takes_s: 1}}}
-sensors:
-  belt.key:     {set_by: operator}
-  belt.waits:   {occupied: entry}
-  belt.carries: {holding: B}
-  belt.lies:    {occupied: table}
-"""
-
-
-@pytest.mark.parametrize("key", ["{set_by: operator}", "{acknowledges: B}", "{occupied: entry, may_flicker: true}"])
-def test_it_may_change_while_a_controller_is_told_one_thing_after_the_other(key: str) -> None:
-    cell, model = parse_net(IN_BETWEEN), parse_plant(CARRIED_ONCE.replace("{set_by: operator}", key))
-    found = {verdict.name: verdict.status for verdict in check_loop(cell, model).verdicts}
-    assert found["loop.accidents"] is Status.VIOLATED
-    for sending in Sending:
-        assert compare(Reading(cell, model, sending), close(cell, model, sending=sending))
-
-
 def test_the_second_reading_has_the_same_loop() -> None:
     for sending in Sending:
         for faults in Faults:

@@ -1,0 +1,109 @@
+"""What a loop has of the moments between two signals: all that can happen then, and nothing that takes longer."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support.between_cells import beside, blind, by_sensors, in_between
+from support.drawn_cells import drawn_cell
+from support.examples import seeds
+
+from firable.analysis.loop.verdicts import LoopReport, check_loop
+from firable.analysis.spaces.reachability import Budget, explore
+from firable.decompose.verification.happenings import Plant
+from firable.decompose.verification.same_loop import compare
+from firable.nets.catalogue import catalogue_net, catalogue_plant
+from firable.nets.machines.closing import close
+from firable.nets.machines.excluding import Excluding
+from firable.nets.machines.loop import ClosedLoop, Faults, Sending
+from firable.nets.machines.moment import Case
+from firable.nets.machines.plant_file import PlantModel
+from firable.nets.machines.telling import Telling
+from firable.nets.net import Net
+from firable.nets.verdict import Status
+
+CELLS = ("one_robot", "one_robot_mc_late", "one_robot_timed", "two_robots_shared")
+KEYS = ("{set_by: operator}", "{acknowledges: B}", "{occupied: entry, may_flicker: true}", "{occupied: entry}")
+
+
+def names(report: LoopReport, verdict: str) -> list[str]:
+    witness = report.verdict(verdict).witness
+    assert witness is not None
+    return [name for (name,) in witness.firings]
+
+
+@pytest.mark.parametrize(
+    ("cell", "between"), [*((in_between(key), "belt.key") for key in KEYS), (beside(), "W/done/belt.working")], ids=str
+)
+def test_all_that_can_happen_may_happen_while_a_controller_is_told_one_thing_after_the_other(
+    cell: tuple[Net, PlantModel], between: str
+) -> None:
+    report = check_loop(*cell)
+    assert report.verdict("loop.accidents").status is Status.VIOLATED
+    run = names(report, "loop.accidents")
+    lies = next(i for i, name in enumerate(run) if name.startswith("B/done"))
+    assert any(name.startswith((between, "arrives/entry")) for name in run[lies:])
+    for sending in Sending:
+        assert compare(Plant(*cell, sending), close(*cell, sending=sending))
+
+
+def test_what_a_time_limit_does_to_a_command_that_is_done_a_moment_before_is_found_without_sensors_too(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    report = check_loop(*blind())
+    assert report.verdict("loop.accidents").status is Status.VIOLATED
+    run = names(report, "loop.accidents")
+    done = next(i for i, name in enumerate(run) if name.startswith("R/done/robot.put/"))
+    assert run[done] == "R/done/robot.put/robot.laid_down-late"
+    assert run[done + 1].startswith("robot.put_timeout/")
+    assert run[-1].endswith("R-empty")
+    monkeypatch.setattr(Telling, "told_late", lambda *_: frozenset())
+    assert check_loop(*blind()).verdict("loop.accidents").holds
+
+
+def test_no_machine_is_done_with_what_it_was_told_to_do_in_between(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert check_loop(*by_sensors()).verdict("loop.property.never_odd").holds
+    for what, instead in (("is_under_way", lambda *_: Case()), ("sent", lambda *args: [args[1]])):
+        with monkeypatch.context() as patch:
+            patch.setattr(Telling, what, instead)
+            assert check_loop(*by_sensors()).verdict("loop.property.never_odd").status is Status.VIOLATED
+
+
+def reached(loop: ClosedLoop, budget: int) -> set[frozenset[str]] | None:
+    """The markings of a loop but for what says what controllers know; None where there are too many."""
+    space = explore(loop.net, budget=Budget(markings=budget))
+    if not space.complete:
+        return None
+    of_telling = (".news", ".told_0", ".told_1", ".starting")
+    kept = {p.name for p in loop.net.places if not p.name.endswith(of_telling)}
+    return {frozenset(kept & {*loop.net.names(one)}) for one in space.markings(np.arange(space.n_markings))}
+
+
+def told_late(net: Net, model: PlantModel, faults: Faults, sending: Sending) -> tuple[ClosedLoop, ClosedLoop]:
+    """The loop, and the one in which all that closes a gate is told late, whoever goes by it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Excluding, "excludes", lambda *_, **__: False)
+        late = close(net, model, faults, sending)
+    return close(net, model, faults, sending), late
+
+
+@pytest.mark.parametrize("faults", [Faults.NONE, Faults.FOR_GOOD])
+@pytest.mark.parametrize("sending", Sending)
+@pytest.mark.parametrize("name", CELLS)
+def test_what_is_told_in_the_instant_because_nobody_could_go_by_it_leaves_nothing_out(
+    name: str, sending: Sending, faults: Faults
+) -> None:
+    loop, late = told_late(catalogue_net(name), catalogue_plant(name), faults, sending)
+    assert loop.news.keys() < late.news.keys()
+    assert (markings := reached(loop, 1_000_000)) is not None
+    assert markings == reached(late, 1_000_000)
+
+
+@pytest.mark.seeds
+@pytest.mark.parametrize("seed", seeds(6))
+def test_in_drawn_cells_it_leaves_nothing_out_either(seed: int) -> None:
+    cell = drawn_cell(seed)
+    for sending in Sending:
+        loop, late = told_late(cell.net, cell.plant, Faults.NONE, sending)
+        if (markings := reached(loop, 20_000)) is not None and (others := reached(late, 60_000)) is not None:
+            assert markings == others, cell
