@@ -191,9 +191,12 @@ class Transition:
 
 
 def is_fault(place: Place, transition: Transition, late: ExternalGate) -> bool:
-    """Whether a transition wants the timer of a place with a time limit 1 (the gate `late`) and its completion 0."""
-    gates = transition.external
-    return late in gates and place.completion is not None and ExternalGate(place.completion, wanted=False) in gates
+    """Whether a transition wants the timer of a place with a time limit 1 (the gate `late`) and its completion 0.
+
+    One that wants the completion 1 as well never fires, and takes no token when the time is over.
+    """
+    completion = {gate.wanted for gate in transition.external if gate.signal == place.completion}
+    return late in transition.external and completion == {False}
 
 
 class ArbitrationRule(StrEnum):

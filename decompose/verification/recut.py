@@ -301,7 +301,8 @@ def is_late(net: Net, t: Transition, place: str) -> bool:
     """
     at = net.place(place)
     wanted = {(gate.signal, gate.wanted) for gate in t.external}
-    return at.within is not None and {(at.within.timer, True), (str(at.completion), False)} <= wanted
+    late = at.within is not None and {(at.within.timer, True), (str(at.completion), False)} <= wanted
+    return late and (str(at.completion), True) not in wanted
 
 
 def check_cut(decomposition: Decomposition) -> Cut:

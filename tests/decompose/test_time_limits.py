@@ -110,6 +110,16 @@ def test_a_fault_transition_that_the_coordinator_is_to_decide_is_another_split()
         check_cut(replace(decomposition, coordinated=(*decomposition.coordinated, row)))
 
 
+def test_what_waits_for_the_timeout_and_the_completion_never_fires_and_is_no_timeout() -> None:
+    never = "  never: {from: a.go, to: b.more, if: a.go_overdue, unless: a.there}\n"
+    decomposition = split(parse_net(HANDOVER.replace("has: }", "has: , more: }") + never))
+    for net in (decomposition.net, replace(decomposition.net, transitions=decomposition.net.transitions[::-1])):
+        faults = {net.places[p].name: net.transitions[t].name for p, t in net.fault_transitions.items()}
+        assert faults == {"a.go": "a.go_timeout"}
+    assert coordinated(decomposition) == {"hand", "never"}
+    check_cut(decomposition)
+
+
 def test_a_subnet_with_another_time_or_timer_is_refuted() -> None:
     decomposition = split(handover())
     subnet = decomposition.subnet("a")
