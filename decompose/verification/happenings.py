@@ -40,6 +40,7 @@ from firable.decompose.verification.plant import (
     BAD,
     GOOD,
     OVERRUN,
+    UNTOLD,
     DiffersError,
     State,
     Things,
@@ -135,24 +136,28 @@ class Plant(Things):
                 yield changes
                 continue
             for told in self.told_at_once(changes, places, state):
-                yield told | self.starts(told, state)
+                all_ = told | self.untold(told, state)
+                yield all_ | self.starts(all_, state)
+
+    def untold(self, changes: Changes, state: State) -> Changes:
+        """Whether there is news now, where some has come or is no more."""
+        if not self.may_start or not any(f"news of {name}" in changes for name in self.late):
+            return {}
+        after = _Overlaid(changes, state)
+        return {UNTOLD: any(after[f"news of {name}"] for name in self.late)}
 
     def starts(self, changes: Changes, state: State) -> Changes:
         """A machine that is given a command while there is news is starting, but one that is stopped at once, or done,
         is not."""
         given = [name for name in self.may_start if f"at {name}" in changes]
         return {
-            f"starting {name}": changes[f"at {name}"] is not None and self.is_any_news(changes, state) for name in given
+            f"starting {name}": changes[f"at {name}"] is not None and _Overlaid(changes, state)[UNTOLD]
+            for name in given
         }
-
-    def is_any_news(self, changes: Changes, state: State) -> bool:
-        """Whether after some changes a controller is still to be told of something."""
-        after = _Overlaid(changes, state)
-        return any(after[f"news of {name}"] for name in self.late)
 
     def started(self, machine: str, state: State) -> Iterator[Changes]:
         """A machine is at its command still when all is told."""
-        if state[f"starting {machine}"] and not self.is_any_news({}, state):
+        if state[f"starting {machine}"] and not state[UNTOLD]:
             yield {f"starting {machine}": False}
 
     def is_still_to_be_told(self, machine: str, state: State) -> bool:

@@ -33,6 +33,7 @@ from firable.nets.net import Net, Place, SignalKind, Transition
 
 ACCIDENT: Final = "accident"
 OVERRUN: Final = "overrun"
+UNTOLD: Final = "untold"
 GOOD: Final = "good"
 BAD: Final = "bad"
 Value = str | bool | None
@@ -82,6 +83,7 @@ class Things:
         found |= {f"told {name}": {True: f"plant.{name}.told_1", False: f"plant.{name}.told_0"} for name in self.late}
         found |= {f"news of {name}": {True: f"plant.{name}.news"} for name in self.late}
         found |= {f"starting {name}": {True: f"plant.{name}.starting"} for name in self.may_start}
+        found |= {UNTOLD: {True: "plant.untold"}} if self.may_start else {}
         found |= {f"acknowledged {name}": {True: f"plant.{name}.acknowledged"} for name in self.sensed}
         if self.sending is Sending.LATE:
             found |= {f"unsent {p.name}": {True: f"plant.unsent.{p.name}"} for p in self.commanding}
@@ -140,6 +142,9 @@ class Things:
                 for lies in ([state[has]] if has in state else self.values(has))
                 for value in ([None] if lies is None else self.values(thing))
             ]
+        if self.may_start and (thing == UNTOLD or thing.startswith("news of ")):
+            ways = ({thing: value} for value in self.values(thing))
+            return [way for way in ways if self.may_be_untold({**state, **way})]
         if not thing.startswith(("breaks off ", "starting ")):
             return [{thing: value} for value in self.values(thing)]
         kind, _, machine = thing.rpartition(" ")
@@ -157,7 +162,7 @@ class Things:
 
     def assert_exists(self, state: State, changes: Mapping[str, Value]) -> None:
         """What has changed has one of its values; nothing is broken off but by a machine at a stop, no machine is
-        starting but at a command, and nothing is judged where nothing lies.
+        starting but at a command, there is news iff something is untold, and nothing is judged where nothing lies.
 
         Raises `DiffersError` where it is not so: no state is compared in which it is not.
         """
@@ -170,12 +175,20 @@ class Things:
                 raise DiffersError(f"{machine} breaks off the command of '{state[breaks]}', and is at no stop")
             if starting in asked and state[starting] and state[at] is None:
                 raise DiffersError(f"{machine} is starting, and is at no command")
+        has_changed = self.may_start and any(thing.startswith("news of ") for thing in changes)
+        if has_changed and state[UNTOLD] != any(state[f"news of {name}"] for name in self.late):
+            raise DiffersError("there is news, and nothing says so, or the other way round")
         for station in self.model.stations:
             has, judged = f"has {station}", f"judged {station}"
             if judged not in self.things or changes.keys().isdisjoint((has, judged)):
                 continue
             if state[has] is None and state[judged] is not None:
                 raise DiffersError(f"nothing lies on {station}, and it was found {state[judged]}")
+
+    def may_be_untold(self, state: State) -> bool:
+        """Whether what is known of all news and of each agrees."""
+        known = [state.get(f"news of {name}") for name in self.late]
+        return UNTOLD not in state or (None in known and not any(known)) or state[UNTOLD] == any(known)
 
     def comes_to_rest(self, at: Value) -> bool:
         """Whether a machine that is at the command of a place comes to rest."""

@@ -44,6 +44,8 @@ Change = tuple[str, bool]
 """A signal, and the value that it changes to."""
 
 _STILL: Final = "still-to-be-told"
+_UNTOLD: Final = f"{PLANT}.untold"
+"""The place that holds a token iff there is news, where that keeps a machine from getting done."""
 
 
 @dataclass(frozen=True)
@@ -181,11 +183,6 @@ class Telling:
         """The place that shows what the controller of a signal knows of it, and whether a token there means 1."""
         return (_told(signal), True) if signal in self.late else self.truth[signal]
 
-    @property
-    def all_told(self) -> Case:
-        """No controller is still to be told anything."""
-        return Case(tuple((news, False) for news in self.news.values()))
-
     def is_under_way(self, place: Place) -> Case:
         """The machine that is at the command of a place is no longer starting. Nothing is news of its keys, which the
         command has released, nor of what sees what a stop has broken off, where the machine says that it is at rest."""
@@ -211,6 +208,8 @@ class Telling:
             yield fact(_told(signal), f"the controller was told that {signal} is 1")
             yield fact(_told(signal, value=False), f"the controller was told that {signal} is 0", marked=True)
             yield fact(_news(signal), f"{signal} has changed, and its controller is still to be told")
+        if self.starting:
+            yield fact(_UNTOLD, "a controller is still to be told of something")
         for name, starting in self.starting.items():
             yield fact(starting, f"{name} was given its command while a controller was still to be told of something")
 
@@ -233,7 +232,7 @@ class Telling:
                     ways.append(Case((*wants, is_not, *known), learns, was, f"{value:d} a moment ago"))
             yield f"{signal}/told", f"the controller is told of {signal}", tuple(ways)
         for name, starting in self.starting.items():
-            started = self.all_told.with_(Case(((starting, True),), ((starting, False),)))
+            started = Case(((_UNTOLD, False), (starting, True)), ((starting, False),))
             yield f"{name}/started", f"{name} is at its command, and all is told", (started,)
 
     def of(self, moment: Moment, places: Collection[Place] = ()) -> list[Moment]:
@@ -263,7 +262,22 @@ class Telling:
             if signal not in self.completions:
                 ways.append(Case(((news, True),), (), f"{signal}-{_STILL}"))
             moments = each(moments, ways)
-        return moments
+        return [one for moment in moments for one in self._with_news(moment)] if self.starting else moments
+
+    def _with_news(self, moment: Moment) -> list[Moment]:
+        """A firing with whether there is news before and after it: the first of all or more, the last or not."""
+        known = [news for news in self.news.values() if news in moment.after]
+        if not any(moment.before[news] for news in known):
+            first, more = Case(((_UNTOLD, False),), ((_UNTOLD, True),)), Case(((_UNTOLD, True),), (), "more")
+            return each([moment], [first, more]) if any(moment.after[news] for news in known) else [moment]
+        untold = (_UNTOLD, True)
+        if any(moment.after[news] for news in known):
+            return each([moment], [Case((untold,))])
+        others, none, ways = {s: news for s, news in self.news.items() if news not in known}, list[Literal](), []
+        for signal, news in others.items():
+            ways.append(Case((untold, *none, (news, True)), (), f"not-yet-{signal}"))
+            none.append((news, False))
+        return each([moment], [Case((untold, *none), ((_UNTOLD, False),)), *ways])
 
     def sent(self, moment: Moment, places: Iterable[Place]) -> list[Moment]:
         """A firing, with what controllers are told of it, in which machines take the commands of some places in turn.
@@ -277,23 +291,14 @@ class Telling:
                 continue
             moments = each(moments, [Case(((starting, False),)), *self._was_starting(name, moment)])
             if self.laws.lasts(place):
-                moments = [after for one in moments for after in each([one], self._starts(starting, one))]
+                tag = "" if _UNTOLD in moment.after else f"{name}-starts"
+                starts = Case(((_UNTOLD, True), (starting, False)), ((starting, True),), tag)
+                moments = each(moments, [Case(((_UNTOLD, False),)), starts])
         return moments
 
     def _was_starting(self, name: str, moment: Moment) -> Iterator[Case]:
         if not moment.before.get(self.laws.idle(name)):
             yield Case(((self.starting[name], True),), ((self.starting[name], False),), f"{name}-starting")
-
-    def _starts(self, starting: str, moment: Moment) -> Iterator[Case]:
-        """There is news in the firing itself; or none at all, or of one signal first."""
-        if any(moment.after.get(news) for news in self.news.values()):
-            yield Case(((starting, False),), ((starting, True),))
-            return
-        yield self.all_told
-        before = list[Literal]()
-        for signal, news in self.news.items():
-            yield Case((*before, (news, True), (starting, False)), ((starting, True),), f"{signal}-is-news")
-            before.append((news, False))
 
     def _changes(self, moment: Moment) -> Iterator[Change]:
         for signal, (place, means) in self.truth.items():

@@ -74,7 +74,7 @@ def reached(loop: ClosedLoop, budget: int) -> set[frozenset[str]] | None:
     space = explore(loop.net, budget=Budget(markings=budget))
     if not space.complete:
         return None
-    of_telling = (".news", ".told_0", ".told_1", ".starting")
+    of_telling = (".news", ".told_0", ".told_1", ".starting", "plant.untold")
     kept = {p.name for p in loop.net.places if not p.name.endswith(of_telling)}
     return {frozenset(kept & {*loop.net.names(one)}) for one in space.markings(np.arange(space.n_markings))}
 

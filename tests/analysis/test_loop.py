@@ -30,7 +30,7 @@ SIZES = {
     "one_robot": (92, 178, 746, 1976),
     "one_robot_mc_late": (91, 176, 1838, 5670),
     "one_robot_mc_late_capacity": (92, 178, 746, 1976),
-    "one_robot_timed": (123, 691, 5894, 22270),
+    "one_robot_timed": (124, 592, 5894, 22270),
     "two_robots_shared": (105, 159, 1706, 5080),
     "two_robots_separate": (105, 159, 1706, 5080),
 }

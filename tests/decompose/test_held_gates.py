@@ -106,7 +106,9 @@ def test_a_judgement_that_machining_changes_after_the_vote_breaks_its_assumption
     assert broken.holds == holds
     if not holds:
         assert broken.witness is not None
-        assert broken.witness.firings[-2:] == (("MC/done/mc.machining/mc_table-passed",), ("mc.fine/told/falls",))
+        *_, (done,), (last,) = broken.witness.firings
+        assert done == "MC/done/mc.machining/mc_table-passed"
+        assert last.startswith("mc.fine/told/falls")
 
 
 def test_a_gate_that_another_machine_closes_is_found() -> None:
