@@ -485,10 +485,7 @@ class Twin:
         firable = [self.loop.net.transitions[t].name for t in self.player.firable(self.marking)]
         for name, machine in self.plant.machines.items():
             ends = any(move.startswith((f"{name}/done/", f"{name}/accident/")) for move in firable)
-            starting = f"plant.{name}.starting"
-            if machine.busy is not None and machine.busy.command == "HALT" and self.holds("plant.untold"):
-                continue  # what it broke off may still be done, and is seen before it says that it is at rest
-            if machine.busy is None or (starting in self.loop.net.place_index and self.holds(starting)):
+            if machine.busy is None or self.is_kept(name, machine.busy):
                 assert not ends
                 continue
             later = deepcopy(self.plant)
@@ -497,6 +494,16 @@ class Twin:
             later._lawful(name, later._happen(Finish(name, busy)))
             waits = later.machines[name].busy
             assert ends == (waits is None or not waits.waits), f"{name} at {busy.command}"
+
+    def is_kept(self, name: str, busy: Busy) -> bool:
+        """Whether a machine gets done later, because a controller is still to be told something: of before it was given
+        its command, or of what it has broken off, where somebody waits until it is at rest."""
+        starting = f"plant.{name}.starting"
+        if starting in self.loop.net.place_index and self.holds(starting):
+            return True
+        shown = {"c.entry", "c.fresh", "c.ok", "c.nok"} & {*self.late}
+        at_rest = self.net.places[busy.ticket].completion == "c.at_rest"
+        return at_rest and any(self.holds(f"plant.{signal}.news") for signal in shown)
 
     def compare_places(self) -> None:
         for station, workpiece in self.plant.stations.items():
