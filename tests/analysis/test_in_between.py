@@ -4,7 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from support.between_cells import beside, blind, by_sensors, in_between
+from support.between_cells import (
+    at_rest,
+    beside,
+    blind,
+    by_sensors,
+    done,
+    done_when_the_next_has_come,
+    in_between,
+    judged,
+)
 from support.drawn_cells import drawn_cell
 from support.examples import seeds
 
@@ -67,6 +76,24 @@ def test_no_machine_is_done_with_what_it_was_told_to_do_in_between(monkeypatch: 
         with monkeypatch.context() as patch:
             patch.setattr(Telling, what, instead)
             assert check_loop(*by_sensors()).verdict("loop.property.never_odd").status is Status.VIOLATED
+
+
+@pytest.mark.parametrize(
+    ("cell", "rule", "instead"),
+    [
+        (done(), "behind", {}),
+        (done_when_the_next_has_come(), "behind", {}),
+        (at_rest(), "is_under_way", lambda self, _: Case(((self.starting["R"], False),))),
+        (judged(), "is_seen", lambda *_: Case()),
+    ],
+    ids=["done", "shown by a sensor", "at rest after a stop", "judged"],
+)
+def test_who_is_told_that_something_is_done_or_judged_was_told_before_what_can_be_seen_of_it(
+    cell: tuple[Net, PlantModel], rule: str, instead: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert check_loop(*cell).verdict("loop.property.never_odd").holds
+    monkeypatch.setattr(Telling, rule, instead)
+    assert check_loop(*cell).verdict("loop.property.never_odd").status is Status.VIOLATED
 
 
 def reached(loop: ClosedLoop, budget: int) -> set[frozenset[str]] | None:

@@ -137,3 +137,116 @@ sensors:
 def by_sensors() -> tuple[Net, PlantModel]:
     """Belts that run by sensors alone: what one has taken away is not seen any more when it has carried it."""
     return parse_net(BY_SENSORS_NET + "properties:\n  never_odd: {never: belt.odd}\n"), parse_plant(BY_SENSORS_PLANT)
+
+
+DONE_NET = """firable: 1
+cell: done
+controllers:
+  robot:
+    start: [free, watching]
+    inputs: [entry, holds]
+    places:
+      free:
+      grasp: {send: {machine: R, command: GRASP, at: ENTRY}, until: grasped}
+      gone:
+      watching:
+      alarm:
+      odd:
+transitions:
+  come: {from: robot.free, to: robot.grasp, if: robot.entry}
+  lost: {from: robot.watching, to: robot.alarm, unless: [robot.entry, robot.holds]}
+  end:  {from: robot.grasp, to: robot.gone, if: robot.holds}
+  odd:  {from: robot.grasp, to: robot.odd, unless: robot.holds}
+properties:
+  never_odd: {never: robot.odd}
+"""
+HAND = """firable_plant: 1
+plant: CELL
+stations: [entry, exit]
+arrivals:   {station: entry, every_s: 5}
+departures: {station: exit, after_s: 1}
+machines:
+  R:
+    hand: ENTRY
+    positions: {ENTRY: entry}
+    commands:
+      GRASP: {does: grasp, takes_s: 1}
+      STOP:  {does: stop}
+sensors:
+  robot.entry: {occupied: entry}
+  robot.holds: {holding: R}
+"""
+
+
+def done() -> tuple[Net, PlantModel]:
+    """A robot that would miss the workpiece in its hand if it was told first that it has grasped it."""
+    return parse_net(DONE_NET), parse_plant(HAND.replace("CELL", "done"))
+
+
+def done_when_the_next_has_come() -> tuple[Net, PlantModel]:
+    """The same robot, which has grasped one when the next workpiece lies there: a sensor shows the completion."""
+    plant = f"{HAND.replace('CELL', 'done')}  robot.next:  {{occupied: entry}}\n"
+    return parse_net(DONE_NET.replace("until: grasped", "until: next")), parse_plant(plant)
+
+
+AT_REST_NET = """firable: 1
+cell: rests
+controllers:
+  robot:
+    start: rest
+    inputs: [entry, holds]
+    places:
+      rest:
+      grasp: {send: {machine: R, command: GRASP, at: ENTRY}}
+      halt:  {send: {machine: R, command: STOP}, until: at_rest}
+      empty:
+      odd:
+transitions:
+  come:  {from: robot.rest, to: robot.grasp, if: robot.entry}
+  stops: {from: robot.grasp, to: robot.halt}
+  empty: {from: robot.halt, to: robot.empty, unless: robot.holds}
+  odd:   {from: robot.empty, to: robot.odd, if: robot.holds}
+properties:
+  never_odd: {never: robot.odd}
+"""
+
+
+def at_rest() -> tuple[Net, PlantModel]:
+    """A robot that is stopped, and looks into its hand when it has come to rest."""
+    return parse_net(AT_REST_NET), parse_plant(HAND.replace("CELL", "rests"))
+
+
+JUDGED_NET = """firable: 1
+cell: judged
+controllers:
+  belt:
+    start: [ready, watching]
+    inputs: [waits, lies, good]
+    places:
+      ready:
+      running: {send: {machine: B, command: RUN}}
+      watching:
+      odd:
+transitions:
+  run: {from: belt.ready, to: belt.running, if: belt.waits}
+  odd: {from: belt.watching, to: belt.odd, if: belt.good, unless: belt.lies}
+properties:
+  never_odd: {never: belt.odd}
+"""
+JUDGED_PLANT = """firable_plant: 1
+plant: judged
+stations: [entry, table, exit]
+arrivals:   {station: entry, every_s: 5}
+departures: {station: exit}
+machines:
+  B: {commands: {RUN: {does: carry, from: entry, to: table, takes_s: 1}}}
+sensors:
+  belt.waits: {occupied: entry}
+  belt.lies:  {occupied: table}
+  belt.good:  {passes: table}
+"""
+
+
+def judged() -> tuple[Net, PlantModel]:
+    """A camera that finds a workpiece good which stays where a belt has carried it."""
+    return parse_net(JUDGED_NET), parse_plant(JUDGED_PLANT)
