@@ -13,6 +13,8 @@ from support.between_cells import (
     done_when_the_next_has_come,
     in_between,
     judged,
+    mixed_up,
+    timed_out,
 )
 from support.drawn_cells import drawn_cell
 from support.examples import seeds
@@ -94,6 +96,16 @@ def test_who_is_told_that_something_is_done_or_judged_was_told_before_what_can_b
     assert check_loop(*cell).verdict("loop.property.never_odd").holds
     monkeypatch.setattr(Telling, rule, instead)
     assert check_loop(*cell).verdict("loop.property.never_odd").status is Status.VIOLATED
+
+
+@pytest.mark.parametrize("cell", [timed_out(), mixed_up()], ids=["the time is over", "another machine sets it"])
+def test_who_takes_the_token_before_the_completion_is_told_goes_by_what_was_seen_before(
+    cell: tuple[Net, PlantModel], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert names(check_loop(*cell), "loop.accidents")[-1].endswith("/R-holds")
+    waited_for = frozenset(place.name for place in cell[0].places if place.completion is not None)
+    monkeypatch.setattr(Excluding, "announced", waited_for)
+    assert check_loop(*cell).verdict("loop.accidents").holds
 
 
 def reached(loop: ClosedLoop, budget: int) -> set[frozenset[str]] | None:

@@ -108,11 +108,10 @@ def test_nobody_is_excluded_where_the_token_may_go_before_the_completion_is_told
     assert not excluded(found, "press.part", value=True)
 
 
-def test_a_part_is_excluded_by_what_its_own_controller_lacks_as_it_may_vote_before_the_others() -> None:
+@pytest.mark.parametrize("puts", ["press.done", "press.working"])
+def test_a_part_is_excluded_by_what_its_own_controller_lacks_as_it_may_vote_before_the_others(puts: str) -> None:
     both = TEXT.replace("glow:  {from: lamp.dark", "glow:  {from: [lamp.dark, press.ready]")
-    assert not excluded(
-        excluding_of(both.replace("to: lamp.lit", "to: [lamp.lit, press.done]")), "lamp.door", value=True
-    )
+    assert not excluded(excluding_of(both.replace("to: lamp.lit", f"to: [lamp.lit, {puts}]")), "lamp.door", value=True)
 
 
 def test_who_reads_the_place_and_waits_for_no_completion_is_not_excluded() -> None:

@@ -250,3 +250,51 @@ sensors:
 def judged() -> tuple[Net, PlantModel]:
     """A camera that finds a workpiece good which stays where a belt has carried it."""
     return parse_net(JUDGED_NET), parse_plant(JUDGED_PLANT)
+
+
+TIMED_OUT_NET = """firable: 1
+cell: again
+controllers:
+  robot:
+    start: free
+    inputs: [entry, holds]
+    places:
+      free:
+      grasp:       {send: {machine: R, command: GRASP, at: ENTRY}, until: grasped, within: 2s}
+      grasp_fault: {send: {machine: R, command: STOP}}
+      have:
+transitions:
+  come:  {from: robot.free, to: robot.grasp, if: robot.entry}
+  again: {from: robot.grasp_fault, to: robot.grasp, unless: robot.holds}
+  end:   {from: robot.grasp, to: robot.have}
+"""
+MIXED_UP_NET = """firable: 1
+cell: again
+controllers:
+  robot:
+    start: [free, ready]
+    inputs: [entry, holds]
+    places:
+      free:
+      ready:
+      grasp: {send: {machine: R, command: GRASP, at: ENTRY}, until: finished}
+      work:  {send: {machine: W, command: WORK}, until: finished}
+      missed:
+      worked:
+transitions:
+  come:  {from: [robot.free, robot.ready], to: [robot.grasp, robot.work], if: robot.entry}
+  miss:  {from: robot.grasp, to: robot.missed}
+  again: {from: robot.missed, to: robot.grasp, unless: robot.holds}
+  end:   {from: robot.work, to: robot.worked}
+"""
+
+
+def timed_out() -> tuple[Net, PlantModel]:
+    """A robot that grasps anew when the time is over and its hand seems to be empty."""
+    return parse_net(TIMED_OUT_NET), parse_plant(HAND.replace("CELL", "again"))
+
+
+def mixed_up() -> tuple[Net, PlantModel]:
+    """A robot that grasps anew when another machine has said that it has finished and its hand seems to be empty."""
+    plant = HAND.replace("machines:\n", "machines:\n  W: {commands: {WORK: {does: work, takes_s: 1}}}\n")
+    return parse_net(MIXED_UP_NET), parse_plant(plant.replace("CELL", "again"))
