@@ -14,6 +14,7 @@ from support.between_cells import (
     in_between,
     judged,
     mixed_up,
+    overdue,
     timed_out,
 )
 from support.drawn_cells import drawn_cell
@@ -96,6 +97,12 @@ def test_who_is_told_that_something_is_done_or_judged_was_told_before_what_can_b
     assert check_loop(*cell).verdict("loop.property.never_odd").holds
     monkeypatch.setattr(Telling, rule, instead)
     assert check_loop(*cell).verdict("loop.property.never_odd").status is Status.VIOLATED
+
+
+def test_a_time_may_be_over_while_a_controller_is_still_to_be_told_that_the_command_is_done() -> None:
+    run = names(check_loop(*overdue()), "loop.property.never_odd")
+    done_at = next(i for i, name in enumerate(run) if name.startswith("R/done/robot.grasp"))
+    assert done_at < run.index("robot.grasp_overdue/over")
 
 
 @pytest.mark.parametrize("cell", [timed_out(), mixed_up()], ids=["the time is over", "another machine sets it"])

@@ -298,3 +298,32 @@ def mixed_up() -> tuple[Net, PlantModel]:
     """A robot that grasps anew when another machine has said that it has finished and its hand seems to be empty."""
     plant = HAND.replace("machines:\n", "machines:\n  W: {commands: {WORK: {does: work, takes_s: 1}}}\n")
     return parse_net(MIXED_UP_NET), parse_plant(plant.replace("CELL", "again"))
+
+
+OVERDUE_NET = """firable: 1
+cell: overdue
+controllers:
+  robot:
+    start: [free, watching]
+    inputs: [entry, holds]
+    places:
+      free:
+      grasp:       {send: {machine: R, command: GRASP, at: ENTRY}, until: grasped, within: 2s}
+      grasp_fault: {send: {machine: R, command: STOP}}
+      have:
+      watching:
+      in_time:
+      odd:
+transitions:
+  come:  {from: robot.free, to: robot.grasp, if: robot.entry}
+  end:   {from: robot.grasp, to: robot.have}
+  early: {from: robot.watching, to: robot.in_time, if: [robot.grasp, robot.holds], unless: robot.grasp_overdue}
+  odd:   {from: robot.in_time, to: robot.odd, if: [robot.grasp, robot.grasp_overdue]}
+properties:
+  never_odd: {never: robot.odd}
+"""
+
+
+def overdue() -> tuple[Net, PlantModel]:
+    """A robot that sees the workpiece in its hand in time, and is told too late that it has grasped it."""
+    return parse_net(OVERDUE_NET), parse_plant(HAND.replace("CELL", "overdue"))
