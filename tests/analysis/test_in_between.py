@@ -16,6 +16,7 @@ from support.between_cells import (
     mixed_up,
     overdue,
     timed_out,
+    tried_again,
 )
 from support.drawn_cells import drawn_cell
 from support.examples import seeds
@@ -103,6 +104,11 @@ def test_a_time_may_be_over_while_a_controller_is_still_to_be_told_that_the_comm
     run = names(check_loop(*overdue()), "loop.property.never_odd")
     done_at = next(i for i, name in enumerate(run) if name.startswith("R/done/robot.grasp"))
     assert done_at < run.index("robot.grasp_overdue/over")
+
+
+def test_a_completion_that_no_sensor_is_told_before_is_not_too_late_for_ever() -> None:
+    """A run that is fair to all that fires tells it in the instant at some time."""
+    assert check_loop(*tried_again()).verdict("loop.property.gets_there").holds
 
 
 @pytest.mark.parametrize("cell", [timed_out(), mixed_up()], ids=["the time is over", "another machine sets it"])

@@ -327,3 +327,29 @@ properties:
 def overdue() -> tuple[Net, PlantModel]:
     """A robot that sees the workpiece in its hand in time, and is told too late that it has grasped it."""
     return parse_net(OVERDUE_NET), parse_plant(HAND.replace("CELL", "overdue"))
+
+
+TRIED_AGAIN_NET = """firable: 1
+cell: again
+controllers:
+  robot:
+    start: free
+    inputs: entry
+    places:
+      free:
+      move:       {send: {machine: R, command: MOVE, to: ENTRY}, until: there, within: 2s}
+      move_fault: {send: {machine: R, command: STOP}}
+      have:
+transitions:
+  come:  {from: robot.free, to: robot.move}
+  again: {from: robot.move_fault, to: robot.move}
+  end:   {from: robot.move, to: robot.have}
+properties:
+  gets_there: {leads_to: {from: robot.move, to: robot.have, fairness: strong}}
+"""
+
+
+def tried_again() -> tuple[Net, PlantModel]:
+    """A robot that moves anew whenever the time is over."""
+    plant = HAND.replace("GRASP: {does: grasp, ", "MOVE:  {does: move,  ").replace("  robot.holds: {holding: R}\n", "")
+    return parse_net(TRIED_AGAIN_NET), parse_plant(plant.replace("CELL", "again"))
