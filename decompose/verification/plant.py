@@ -433,8 +433,8 @@ class Things:
         return (come if target is not None else []) + (gone if source is not None else [])
 
     def judging(self, station: str | None) -> list[str]:
-        """The sensors that show what the workpiece on a station was found."""
-        sensors = self.model.sensors.items()
+        """The sensors that are no completions and show what the workpiece on a station was found."""
+        sensors = [(name, one) for name, one in self.model.sensors.items() if name not in self.sensed]
         return [name for name, one in sensors if station is not None and station in (one.passes, one.fails)]
 
     # --- What a signal shows

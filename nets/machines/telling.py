@@ -159,11 +159,12 @@ class Telling:
         if source is not None:
             yield from ((signal, False) for signal in self._judging(source))
 
-    def _judging(self, station: str) -> dict[str, bool]:
-        """The signals that show what a workpiece there was found, and whether that is good."""
-        sensors = self.laws.model.sensors
-        read = (signal.name for signal in self.laws.net.signals if signal.name in sensors)
-        return {name: sensors[name].passes is not None for name in read if sensors[name].judges == station}
+    def _judging(self, station: str) -> Iterator[str]:
+        """The sensors that show what a workpiece there was found; a completion that one of them forms stays."""
+        for signal in self.laws.net.signals:
+            sensor = self.laws.model.sensors.get(signal.name)
+            if sensor is not None and sensor.judges == station and signal.name not in self.completions:
+                yield signal.name
 
     @property
     def news(self) -> dict[str, str]:

@@ -15,6 +15,7 @@ from support.between_cells import (
     judged,
     mixed_up,
     overdue,
+    tested,
     timed_out,
     tried_again,
 )
@@ -109,6 +110,14 @@ def test_a_time_may_be_over_while_a_controller_is_still_to_be_told_that_the_comm
 def test_a_completion_that_no_sensor_is_told_before_is_not_too_late_for_ever() -> None:
     """A run that is fair to all that fires tells it in the instant at some time."""
     assert check_loop(*tried_again()).verdict("loop.property.gets_there").holds
+
+
+def test_a_completion_that_a_camera_forms_waits_for_other_sensors_and_not_for_itself() -> None:
+    loop = close(*tested())
+    assert "plant.robot.lies.news" in loop.net.transition("robot.good/told/rises").inhibitive
+    assert check_loop(*tested()).verdict("loop.gates-open").holds
+    for sending in Sending:
+        assert compare(Plant(*tested(), sending), close(*tested(), sending=sending))
 
 
 @pytest.mark.parametrize("cell", [timed_out(), mixed_up()], ids=["the time is over", "another machine sets it"])

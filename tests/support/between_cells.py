@@ -353,3 +353,38 @@ def tried_again() -> tuple[Net, PlantModel]:
     """A robot that moves anew whenever the time is over."""
     plant = HAND.replace("GRASP: {does: grasp, ", "MOVE:  {does: move,  ").replace("  robot.holds: {holding: R}\n", "")
     return parse_net(TRIED_AGAIN_NET), parse_plant(plant.replace("CELL", "again"))
+
+
+TESTED_NET = """firable: 1
+cell: tested
+controllers:
+  robot:
+    start: [free, watching]
+    inputs: lies
+    places:
+      free:
+      grasp: {send: {machine: R, command: GRASP, at: TABLE}, until: good}
+      watching:
+      saw:
+transitions:
+  come:  {from: robot.free, to: robot.grasp, if: robot.lies}
+  end:   {from: robot.grasp, to: robot.free}
+  watch: {from: robot.watching, to: robot.saw, unless: robot.good}
+  back:  {from: robot.saw, to: robot.watching}
+"""
+TESTED_PLANT = """firable_plant: 1
+plant: tested
+stations: [table]
+arrivals:   {station: table, every_s: 5}
+departures: {station: table}
+machines:
+  R: {hand: TABLE, positions: {TABLE: table}, commands: {GRASP: {does: grasp, takes_s: 1}}}
+sensors:
+  robot.lies: {occupied: table}
+  robot.good: {passes: table}
+"""
+
+
+def tested() -> tuple[Net, PlantModel]:
+    """A robot that is done with one workpiece when the next one was found good."""
+    return parse_net(TESTED_NET), parse_plant(TESTED_PLANT)
