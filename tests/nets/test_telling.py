@@ -9,9 +9,11 @@ from support.stale_cells import carried, stopped
 from support.together_cell import NET, together
 
 from firable.analysis.loop.verdicts import check_loop
+from firable.decompose.verification.happenings import Plant
+from firable.decompose.verification.same_loop import compare
 from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.machines.closing import close
-from firable.nets.machines.loop import ClosedLoop
+from firable.nets.machines.loop import ClosedLoop, Sending
 from firable.nets.machines.plant_file import PlantModel, parse_plant
 from firable.nets.machines.telling import Telling
 from firable.nets.net import Net
@@ -136,3 +138,95 @@ def test_in_the_catalogue_only_a_key_is_told_late_and_completions_that_have_a_ti
     assert told == {place.completion for place in net.places if place.within is not None} | (
         {"robot.reset"} if name == "one_robot_timed" else set()
     )
+
+
+READ_NET = """\
+firable: 1
+cell: read
+controllers:
+  belt:
+    start: [ready, watching]
+    inputs: [SENSORS]
+    places:
+      ready:
+      aside:   {send: {machine: S, command: STOP}}
+      running: {send: {machine: B, command: RUN}, until: brought}
+      still:
+      after:
+      watching:
+      saw:
+transitions:
+  go:    {from: belt.ready, to: [belt.aside, belt.running]}
+  end:   {from: [belt.aside, belt.running], to: belt.still, END}
+  then:  {from: belt.still, to: belt.after, THEN}
+  watch: {from: belt.watching, to: belt.saw, WATCH}
+"""
+READ_PLANT = """\
+firable_plant: 1
+plant: read
+stations: [entry, table, exit]
+arrivals:   {station: entry, every_s: 4}
+departures: DEPARTURES
+machines:
+  S: {commands: {STOP: {does: stop}}}
+  B: {commands: {RUN: {does: carry, from: entry, to: table, takes_s: 4}, HALT: {does: stop}}}
+sensors:
+  belt.one: SENSOR
+"""
+
+
+def read(where: str, gate: str, sensor: str, saw: str = "") -> tuple[Net, PlantModel]:
+    """A belt that brings a workpiece to a table for good, beside which a machine is stopped; one gate reads one signal.
+
+    Who reads it as the belt is done, or after that, cannot do so before; who watches it can at any time.
+    """
+    text, out = READ_NET.replace("saw:", f"saw: {saw}"), "{station: table}" if "leaves" in gate else "{station: exit}"
+    for one in ("END", "THEN", "WATCH"):
+        text = text.replace(f", {one}", f", {gate.removeprefix('leaves ')}" if one == where else "")
+    text, sensors = text.replace("SENSORS", "one"), READ_PLANT.replace("SENSOR", sensor)
+    if "brought" in gate:
+        text = text.replace("inputs: [one]", "inputs: []")
+        sensors = sensors.replace("belt.one", "belt.brought") if sensor else sensors.replace("\n  belt.one: ", " {}")
+    return parse_net(text), parse_plant(sensors.replace("DEPARTURES", out))
+
+
+@pytest.mark.parametrize(
+    ("where", "gate", "sensor", "expected"),
+    [
+        ("WATCH", "unless: belt.one", "{holding: B}", ["belt.one"]),
+        ("WATCH", "if: belt.one", "{holding: B}", ["belt.one", "belt.brought"]),
+        ("WATCH", "if: belt.one", "{holding: B, may_linger: true}", ["belt.one"]),
+        ("WATCH", "unless: belt.brought", "", ["belt.brought"]),
+        ("THEN", "unless: belt.brought", "", []),
+        ("THEN", "unless: belt.brought", "{occupied: table}", ["belt.brought"]),
+        ("THEN", "if: belt.brought", "{occupied: table, may_flicker: true}", []),
+        ("END", "unless: belt.one", "{occupied: table}", []),
+        ("END", "unless: belt.one", "{occupied: table, may_flicker: true}", ["belt.one"]),
+        ("END", "if: belt.one", "{occupied: table, may_flicker: true}", ["belt.one"]),
+        ("END", "if: belt.one", "{occupied: table}", []),
+        ("END", "if: belt.one", "{occupied: table, may_linger: true}", ["belt.one"]),
+        ("END", "leaves if: belt.one", "{occupied: table}", ["belt.one"]),
+        ("END", "unless: belt.one", "{passes: table}", ["belt.one"]),
+        ("END", "if: belt.one", "{passes: table}", []),
+        ("END", "leaves if: belt.one", "{fails: table}", ["belt.one"]),
+        ("END", "unless: belt.one", "{set_by: operator}", ["belt.one"]),
+        ("END", "if: belt.one", "{acknowledges: B}", ["belt.one"]),
+    ],
+)
+def test_what_is_told_late_is_what_may_change_while_somebody_could_go_by_the_old_value(
+    where: str, gate: str, sensor: str, expected: list[str]
+) -> None:
+    net, plant = read(where, gate, sensor)
+    for sending in Sending:
+        loop = close(net, plant, sending=sending)
+        assert late(loop) == expected
+        assert compare(Plant(net, plant, sending), loop)
+
+
+def test_what_a_machine_still_does_after_a_stop_is_told_late_whoever_waits_for_its_command() -> None:
+    stopped = "{send: {machine: B, command: HALT}, until: at_rest}"
+    net, plant = read("END", "unless: belt.one", "{occupied: table}", stopped)
+    loop = close(net, plant)
+    assert late(loop) == ["belt.one"]
+    assert "plant.belt.one.news" in loop.net.transition("B/still-done/belt.running").outputs
+    assert compare(Plant(net, plant, Sending.AT_ONCE), loop)
