@@ -80,6 +80,12 @@ def test_each_controller_of_the_catalogue_that_has_one_token_is_found_to_have_it
     assert with_one_token(net, "robot.to_cv1", "mc.free") is not None, "the machine is reserved before"
 
 
+def test_places_that_no_token_reaches_have_none_and_not_one() -> None:
+    ring = "firable: 1\ncell: ring\nplaces: {a: , b: }\ntransitions: {go: {from: a, to: b}, back: {from: b, to: a}}\n"
+    assert with_one_token(parse_net(ring), "a", "b") is None
+    assert with_one_token(parse_net(f"{ring}start: a\n"), "a", "b") == frozenset("ab")
+
+
 def test_a_search_that_is_too_long_finds_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     net = catalogue_net("one_robot")
     monkeypatch.setattr(excluding, "STEPS_MAX", 2)
