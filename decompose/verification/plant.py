@@ -418,11 +418,7 @@ class Things:
 
     def seen_of(self, source: str | None, target: str | None) -> list[tuple[str, bool]]:
         """What sensors that are no completions show at once, of a workpiece that goes."""
-        sees = {
-            name: sensor
-            for name, sensor in self.model.sensors.items()
-            if sensor.acknowledges is None and name not in self.sensed
-        }
+        sees = {name: sensor for name, sensor in self.model.sensors.items() if name not in self.sensed}
         come = [(name, True) for name, sensor in sees.items() if target in (sensor.occupied, sensor.holding)]
         gone = [
             (name, False)

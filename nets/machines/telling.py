@@ -149,7 +149,7 @@ class Telling:
         """What sensors see at once of a workpiece that goes from one to the other."""
         for signal in self.laws.net.signals:
             sensor = self.laws.model.sensors.get(signal.name)
-            if sensor is None or signal.name in self.completions or sensor.by_hand:
+            if sensor is None or signal.name in self.completions:
                 continue
             sees = sensor.occupied or sensor.holding or ""
             if sees == target:
