@@ -284,10 +284,10 @@ class Telling:
         """A firing, with what controllers are told of it, in which machines take the commands of some places in turn.
 
         A machine is starting where there is news then, but at a stop at once; at the command before it was, or was not.
+        What it is given last in one firing is what it is at: to it the commands before are none.
         """
-        moments = [moment]
-        for place in places:
-            name, _ = self.laws.machine(place)
+        moments, last = [moment], {self.laws.machine(place)[0]: place for place in places}
+        for name, place in last.items():
             if (starting := self.starting.get(name)) is None:
                 continue
             moments = each(moments, [Case(((starting, False),)), *self._was_starting(name, moment)])

@@ -18,6 +18,7 @@ from support.between_cells import (
     tested,
     timed_out,
     tried_again,
+    twice,
 )
 from support.drawn_cells import drawn_cell
 from support.examples import seeds
@@ -128,6 +129,18 @@ def test_who_takes_the_token_before_the_completion_is_told_goes_by_what_was_seen
     waited_for = frozenset(place.name for place in cell[0].places if place.completion is not None)
     monkeypatch.setattr(Excluding, "announced", waited_for)
     assert check_loop(*cell).verdict("loop.accidents").holds
+
+
+@pytest.mark.parametrize("sending", Sending)
+def test_a_machine_that_is_given_two_commands_in_one_firing_while_there_is_news_is_at_the_last(
+    sending: Sending,
+) -> None:
+    loop = close(*twice(), sending=sending)
+    assert compare(Plant(*twice(), sending), loop)
+    assert loop.news
+    assert any(
+        {"belt.run", "plant.B.at.belt.halt", "plant.B.breaks_off.belt.run"} <= one for one in reached(loop, 999) or ()
+    )
 
 
 def reached(loop: ClosedLoop, budget: int) -> set[frozenset[str]] | None:

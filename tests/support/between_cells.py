@@ -388,3 +388,38 @@ sensors:
 def tested() -> tuple[Net, PlantModel]:
     """A robot that is done with one workpiece when the next one was found good."""
     return parse_net(TESTED_NET), parse_plant(TESTED_PLANT)
+
+
+TWICE_NET = """firable: 1
+cell: twice
+controllers:
+  belt:
+    start: [rest, calm]
+    inputs: entry
+    places:
+      rest:
+      run:  {send: {machine: B, command: RUN}}
+      halt: {send: {machine: B, command: STOP}, until: at_rest}
+      calm:
+      seen:
+transitions:
+  go:  {from: belt.rest, to: [belt.run, belt.halt], if: belt.entry}
+  see: {from: belt.calm, to: belt.seen, if: belt.entry}
+properties:
+  never_run: {never: belt.run}
+"""
+TWICE_PLANT = """firable_plant: 1
+plant: twice
+stations: [entry, exit]
+arrivals:   {station: entry, every_s: 5}
+departures: {station: exit, raw: true}
+machines:
+  B: {commands: {RUN: {does: carry, from: entry, to: exit, takes_s: 4}, STOP: {does: stop}}}
+sensors:
+  belt.entry: {occupied: entry}
+"""
+
+
+def twice() -> tuple[Net, PlantModel]:
+    """A belt is started and stopped in one firing, and takes its workpiece before a controller is told."""
+    return parse_net(TWICE_NET), parse_plant(TWICE_PLANT)
