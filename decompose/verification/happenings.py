@@ -194,13 +194,16 @@ class Plant(Things):
         yield from (changes | way for way in ways)
 
     def told(self, name: str, state: State) -> Iterator[Changes]:
-        """A controller is told of a signal that has changed, of a completion behind what sensors show of it."""
+        """A controller is told of a signal that has changed, of a completion behind what sensors show of it; or of an
+        earlier change: it was different meanwhile, or has flickered before it fell."""
         if any(state[f"news of {one}"] for one in self.told_before.get(name, ())):
             return
         if not state[f"news of {name}"]:
             return
         if bool(state[f"told {name}"]) != (value := self.is_true(name, state)):
             yield {f"news of {name}": False, f"told {name}": value}
+            if not value and name not in self.completions and name in self.flickering:
+                yield {f"told {name}": False}
         elif name not in self.completions:  # it was different meanwhile
             yield {f"told {name}": not value}
 

@@ -249,6 +249,11 @@ class Things:
         return tuple(name for name in self.completions if name in self.model.sensors)
 
     @cached_property
+    def flickering(self) -> set[str]:
+        """The signals of sensors that may drop though there is something to see."""
+        return {name for name, sensor in self.model.sensors.items() if sensor.may_flicker}
+
+    @cached_property
     def timers(self) -> dict[str, Place]:
         """The time limits that somebody reads besides the transition that takes the token when the time is over."""
         of_faults = {(self.net.places[p].name, t) for p, t in self.net.fault_transitions.items()}

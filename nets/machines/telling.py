@@ -218,10 +218,12 @@ class Telling:
         """For each signal that is told late the firing in which it is, its description, and its ways; for each machine
         the one in which it is starting no more.
 
-        There is news of what is as the controller knows it where it was different in between.
+        There is news of what is as the controller knows it where it was different in between. A sensor that may
+        flicker may have dropped and come back before it fell, and more than once: all that is told after it fell.
         """
         for signal in self.late:
             place, means = self.truth[signal]
+            sensor = self.laws.model.sensors.get(signal)
             news = _news(signal)
             wants = ((news, True), *((_news(other), False) for other in self.behind.get(signal, ())))
             ways = list[Case]()
@@ -231,6 +233,8 @@ class Telling:
                 ways.append(Case((*wants, is_so, *known), ((news, False), *learns), word, f"now {value:d}"))
                 if signal not in self.completions:
                     ways.append(Case((*wants, is_not, *known), learns, was, f"{value:d} a moment ago"))
+                if not value and sensor is not None and sensor.may_flicker and signal not in self.completions:
+                    ways.append(Case((*wants, is_so, *known), learns, "flickered", "0 a moment ago, and 1 since"))
             yield f"{signal}/told", f"the controller is told of {signal}", tuple(ways)
         for name, starting in self.starting.items():
             started = Case(((_UNTOLD, False), (starting, True)), ((starting, False),))

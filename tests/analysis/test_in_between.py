@@ -8,6 +8,7 @@ from support.between_cells import (
     at_rest,
     beside,
     blind,
+    bouncing,
     by_sensors,
     done,
     done_when_the_next_has_come,
@@ -129,6 +130,22 @@ def test_who_takes_the_token_before_the_completion_is_told_goes_by_what_was_seen
     waited_for = frozenset(place.name for place in cell[0].places if place.completion is not None)
     monkeypatch.setattr(Excluding, "announced", waited_for)
     assert check_loop(*cell).verdict("loop.accidents").holds
+
+
+def test_a_sensor_that_flickers_as_a_workpiece_goes_may_be_told_to_have_come_back() -> None:
+    report = check_loop(*bouncing())
+    assert report.verdict("loop.accidents").status is Status.VIOLATED
+    run = names(report, "loop.accidents")
+    assert run[run.index("go") :] == [
+        "go",
+        "belt.entry/told/flickered",
+        "left",
+        "belt.entry/told/rose",
+        "next/A-nothing",
+    ]
+    assert check_loop(*bouncing("")).verdict("loop.accidents").holds
+    for sending in Sending:
+        assert compare(Plant(*bouncing(), sending), close(*bouncing(), sending=sending))
 
 
 @pytest.mark.parametrize("sending", Sending)

@@ -423,3 +423,39 @@ sensors:
 def twice() -> tuple[Net, PlantModel]:
     """A belt is started and stopped in one firing, and takes its workpiece before a controller is told."""
     return parse_net(TWICE_NET), parse_plant(TWICE_PLANT)
+
+
+BOUNCING_NET = """firable: 1
+cell: bouncing
+controllers:
+  belt:
+    start: [rest, watch]
+    inputs: entry
+    places:
+      rest:
+      run:  {send: {machine: B, command: RUN}}
+      watch:
+      gone:
+      more: {send: {machine: A, command: RUN}}
+transitions:
+  go:   {from: belt.rest, to: belt.run, if: belt.entry}
+  left: {from: belt.watch, to: belt.gone, if: belt.run, unless: belt.entry}
+  next: {from: belt.gone, to: belt.more, if: belt.entry}
+"""
+BOUNCING_PLANT = """firable_plant: 1
+plant: bouncing
+stations: [entry, left, right]
+arrivals:   {station: entry, every_s: 5}
+departures: {station: left, raw: true}
+machines:
+  A: {commands: {RUN: {does: carry, from: entry, to: left, takes_s: 4, when_full: wait}}}
+  B: {commands: {RUN: {does: carry, from: entry, to: right, takes_s: 4, when_full: wait}}}
+sensors:
+  belt.entry: {occupied: entry}
+"""
+
+
+def bouncing(extra: str = ", may_flicker: true") -> tuple[Net, PlantModel]:
+    """A belt is told to carry the next workpiece when a sensor comes back, which has flickered as the last one went."""
+    plant = BOUNCING_PLANT.replace("{occupied: entry}", f"{{occupied: entry{extra}}}")
+    return parse_net(BOUNCING_NET), parse_plant(plant)
