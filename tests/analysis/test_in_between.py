@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from support.between_cells import (
     at_rest,
@@ -23,9 +22,9 @@ from support.between_cells import (
 )
 from support.drawn_cells import drawn_cell
 from support.examples import seeds
+from support.physical_cell import reached
 
 from firable.analysis.loop.verdicts import LoopReport, check_loop
-from firable.analysis.spaces.reachability import Budget, explore
 from firable.decompose.verification.happenings import Plant
 from firable.decompose.verification.same_loop import compare
 from firable.nets.catalogue import catalogue_net, catalogue_plant
@@ -158,16 +157,6 @@ def test_a_machine_that_is_given_two_commands_in_one_firing_while_there_is_news_
     assert any(
         {"belt.run", "plant.B.at.belt.halt", "plant.B.breaks_off.belt.run"} <= one for one in reached(loop, 999) or ()
     )
-
-
-def reached(loop: ClosedLoop, budget: int) -> set[frozenset[str]] | None:
-    """The markings of a loop but for what says what controllers know; None where there are too many."""
-    space = explore(loop.net, budget=Budget(markings=budget))
-    if not space.complete:
-        return None
-    of_telling = (".news", ".told_0", ".told_1", ".starting", "plant.untold")
-    kept = {p.name for p in loop.net.places if not p.name.endswith(of_telling)}
-    return {frozenset(kept & {*loop.net.names(one)}) for one in space.markings(np.arange(space.n_markings))}
 
 
 def told_late(net: Net, model: PlantModel, faults: Faults, sending: Sending) -> tuple[ClosedLoop, ClosedLoop]:
