@@ -11,11 +11,11 @@ from support.between_cells import (
     by_sensors,
     done,
     done_when_the_next_has_come,
+    found_good,
     in_between,
     judged,
     mixed_up,
     overdue,
-    tested,
     timed_out,
     tried_again,
     twice,
@@ -114,11 +114,11 @@ def test_a_completion_that_no_sensor_is_told_before_is_not_too_late_for_ever() -
 
 
 def test_a_completion_that_a_camera_forms_waits_for_other_sensors_and_not_for_itself() -> None:
-    loop = close(*tested())
+    loop = close(*found_good())
     assert "plant.robot.lies.news" in loop.net.transition("robot.good/told/rises").inhibitive
-    assert check_loop(*tested()).verdict("loop.gates-open").holds
+    assert check_loop(*found_good()).verdict("loop.gates-open").holds
     for sending in Sending:
-        assert compare(Plant(*tested(), sending), close(*tested(), sending=sending))
+        assert compare(Plant(*found_good(), sending), close(*found_good(), sending=sending))
 
 
 @pytest.mark.parametrize("cell", [timed_out(), mixed_up()], ids=["the time is over", "another machine sets it"])

@@ -385,7 +385,7 @@ sensors:
 """
 
 
-def tested() -> tuple[Net, PlantModel]:
+def found_good() -> tuple[Net, PlantModel]:
     """A robot that is done with one workpiece when the next one was found good."""
     return parse_net(TESTED_NET), parse_plant(TESTED_PLANT)
 
