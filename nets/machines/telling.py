@@ -278,8 +278,8 @@ class Telling:
         untold = (_UNTOLD, True)
         if any(moment.after[news] for news in known):
             return each([moment], [Case((untold,))])
-        others, none, ways = {s: news for s, news in self.news.items() if news not in known}, list[Literal](), []
-        for signal, news in others.items():
+        none, ways = list[Literal](), []
+        for signal, news in self.news.items():
             ways.append(Case((untold, *none, (news, True)), (), f"not-yet-{signal}"))
             none.append((news, False))
         return each([moment], [Case((untold, *none), ((_UNTOLD, False),)), *ways])
