@@ -9,8 +9,9 @@ named, for a person to check on the cell. Where it may fail, the interlock belon
 
 That holds of a local transition too if it is in the conflict component of a global one (O2): it is decided by the
 coordinator, from a vote of its one part, and fires when the order comes. Only a local transition that its own
-controller fires reads its gates and fires in one act, and assumes nothing. Rejected: to ask of the coordinator table
-alone, which names the global transitions only.
+controller fires reads its gates and fires in one act, and assumes nothing; and so does one that wants a signal both 1
+and 0, for which nobody ever votes. Rejected: to ask of the coordinator table alone, which names the global transitions
+only.
 """
 
 from __future__ import annotations
@@ -40,6 +41,7 @@ def assumptions(decomposition: Decomposition) -> tuple[Assumption, ...]:
     return tuple(
         Assumption(row.name, gate.signal, gate.wanted)
         for row in decomposition.coordinated
+        if net.transition(row.name).openable
         for gate in net.transition(row.name).external
         if not gate.wanted or net.signal(gate.signal).kind is SignalKind.SENSOR
     )

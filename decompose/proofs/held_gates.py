@@ -99,6 +99,7 @@ def held_gates(
     completions = [
         Assumption(row.name, gate.signal, gate.wanted)
         for row in decomposition.coordinated
+        if decomposition.net.transition(row.name).openable
         for gate in decomposition.net.transition(row.name).external
         if _is_completion(decomposition.net, gate)
     ]

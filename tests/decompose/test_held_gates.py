@@ -183,6 +183,17 @@ def test_the_gate_of_a_local_transition_that_the_coordinator_decides_is_asked_of
     assert broken.witness.firings[-2:] == (("a.door/drops",), ("a.door/told/falls",))
 
 
+def test_nothing_is_asked_of_a_transition_that_wants_a_signal_both_1_and_0_for_which_nobody_votes() -> None:
+    both = "\n  never: {from: sys.s, to: sys.s2, if: [a.light, a.out], unless: [a.light, a.out]}"
+    text = LOCAL_BESIDE_GLOBAL.replace("inputs: door", "inputs: [door, light]").replace(
+        "\ntransitions:", f"\ntransitions:{both}"
+    )
+    net = parse_net(text.replace("among: [l, g]", "among: [l, g, never]"))
+    verdicts = held_gates(split(net), parse_plant(f"{ITS_MACHINE}  a.light: {{occupied: exit}}\n")).verdicts
+    assert [verdict.name for verdict in verdicts] == ["o4.l/a.door", COMPLETIONS, COMMANDS]
+    assert all(verdict.holds for verdict in verdicts)
+
+
 TWO_COMMAND_ONE_BELT = """\
 firable: 1
 cell: late
