@@ -142,7 +142,7 @@ def _vote(loop: ClosedLoop, net: Net, part: Transition, one: Assumption) -> Form
     open where the verdict on them holds, and of which nothing but themselves is assumed there."""
     gates = [(one.signal, one.wanted)]
     if not _is_completion(net, one):
-        gates += [(gate.signal, True) for gate in part.external if gate.wanted and _is_completion(net, gate)]
+        gates += [(gate.signal, True) for gate in part.external if _is_completion(net, gate)]
     shown = ((*loop.shown[signal], wanted) for signal, wanted in gates)
     open_ = (Holds(place) if means == wanted else Not(Holds(place)) for place, means, wanted in shown)
     read = (*part.inputs, *part.permissive)
