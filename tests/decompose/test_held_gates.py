@@ -194,6 +194,80 @@ def test_nothing_is_asked_of_a_transition_that_wants_a_signal_both_1_and_0_for_w
     assert all(verdict.holds for verdict in verdicts)
 
 
+TWO_STATIONS = """\
+firable: 1
+cell: stations
+controllers:
+  sys: {coordinator: true, start: s, inputs: [one, two], places: {s: , u: }}
+  robot:
+    start: free
+    places:
+      free:
+      fill_one:  {send: {machine: R, command: TO_ONE},   until: filled_one}
+      fill_two:  {send: {machine: R, command: TO_TWO},   until: filled_two}
+      clear_two: {send: {machine: R, command: FROM_TWO}, until: cleared_two}
+      clear_one: {send: {machine: R, command: FROM_ONE}, until: cleared_one}
+transitions:
+  t1: {from: robot.free, to: robot.fill_one}
+  t2: {from: robot.fill_one, to: robot.fill_two}
+  t3: {from: robot.fill_two, to: robot.clear_two}
+  t4: {from: robot.clear_two, to: robot.clear_one}
+  t5: {from: robot.clear_one, to: robot.free}
+  g: {from: sys.s, to: sys.u, if: [robot.clear_two, sys.one, sys.two]}
+  back: {from: sys.u, to: sys.s}
+"""
+THEIR_ROBOT = """\
+firable_plant: 1
+plant: stations
+stations: [entry, one, two, exit]
+arrivals:   {station: entry, every_s: 8}
+departures: {station: exit, after_s: 1}
+machines:
+  R:
+    commands:
+      TO_ONE:   {does: carry, from: entry, to: one, takes_s: 1}
+      TO_TWO:   {does: carry, from: entry, to: two, takes_s: 1}
+      FROM_TWO: {does: carry, from: two, to: exit, takes_s: 1, when_full: wait}
+      FROM_ONE: {does: carry, from: one, to: exit, takes_s: 1, when_full: wait}
+sensors:
+  sys.one: {occupied: one}
+  sys.two: {occupied: two}
+"""
+
+
+def test_a_gate_that_closes_after_the_other_one_of_its_vote_is_not_kept_open_either() -> None:
+    verdicts = held_gates(split(parse_net(TWO_STATIONS)), parse_plant(THEIR_ROBOT)).verdicts
+    runs = {verdict.name: verdict.witness.firings for verdict in verdicts[:2] if verdict.witness is not None}
+    assert {name: (firings[-2], firings[-1]) for name, firings in runs.items()} == {
+        "o4.g/sys.one": (("sent/robot.clear_one",), ("sys.one/told/falls",)),
+        "o4.g/sys.two": (("sent/robot.clear_two",), ("sys.two/told/falls",)),
+    }
+    assert ("sys.two/told/falls",) in runs["o4.g/sys.one"], "the other one has been closed for long"
+
+
+FILLING = """\
+firable: 1
+cell: filling
+controllers:
+  sys: {coordinator: true, start: [s, k], places: {s: , s2: , k: , k2: }}
+  a:
+    inputs: door
+    places: {p: , run: {send: {machine: B, command: RUN}, until: out}}
+transitions:
+  fills: {from: sys.s, to: [sys.s2, a.run], if: a.door}
+  ends: {from: a.run, to: a.p}
+  again: {from: [a.p, sys.s2], to: sys.s}
+  beside: {from: sys.k, to: sys.k2, if: a.door, unless: a.run}
+  back: {from: sys.k2, to: sys.k}
+"""
+
+
+def test_nobody_has_voted_while_a_place_that_the_part_needs_empty_is_full() -> None:
+    verdicts = held_gates(split(parse_net(FILLING)), parse_plant(ITS_MACHINE)).verdicts
+    assert [verdict.name for verdict in verdicts] == ["o4.fills/a.door", "o4.beside/a.door", COMPLETIONS, COMMANDS]
+    assert [verdict.holds for verdict in verdicts] == [True] * 4
+
+
 TWO_COMMAND_ONE_BELT = """\
 firable: 1
 cell: late
