@@ -193,6 +193,52 @@ def test_a_bundle_of_a_cell_with_a_camera_is_shown_and_one_with_another_camera_i
     assert not refused(resealed(bundle, text.replace("likely: 0.6", "likely: 0.7")))
 
 
+JOINING = """\
+firable: 1
+cell: joining
+controllers:
+  sys: {coordinator: true, start: u, places: {s: , u: , v: }}
+  r:
+    start: free
+    inputs: [entry, here, there]
+    places:
+      free:
+      brings: {send: {machine: A, command: BRING}, until: brought}
+      opens:  {send: {machine: B, command: OPEN},  until: opened}
+      takes:  {send: {machine: A, command: TAKE},  until: taken}
+transitions:
+  begin: {from: [r.free, sys.u], to: [r.brings, r.opens, sys.s], if: r.entry}
+  join: {from: [r.brings, r.opens, sys.s], to: [r.takes, sys.v], if: r.here, unless: r.there}
+  end: {from: [r.takes, sys.v], to: [r.free, sys.u]}
+"""
+ITS_MACHINES = """\
+firable_plant: 1
+plant: joining
+stations: [entry, table, exit]
+arrivals:   {station: entry, every_s: 8}
+departures: {station: exit, after_s: 1}
+machines:
+  A:
+    commands:
+      BRING: {does: carry, from: entry, to: table, takes_s: 1}
+      TAKE:  {does: carry, from: table, to: exit, takes_s: 1}
+  B: {commands: {OPEN: {does: work, takes_s: 1}}}
+sensors:
+  r.entry: {occupied: entry}
+  r.here:  {occupied: table}
+  r.there: {occupied: exit}
+"""
+
+
+@pytest.mark.usefixtures("remembering")
+def test_gates_of_a_part_that_awaits_two_completions_are_asked_as_the_prover_asks_them() -> None:
+    """Of a gate is asked where both completions are there, of a completion whatever the other one is."""
+    bundle = make_bundle(check(parse_net(JOINING)), plant=ITS_MACHINES)
+    asked = [verdict.name for verdict in bundle.verdicts if verdict.name.startswith("o4.")]
+    assert asked == ["o4.begin/r.entry", "o4.join/r.here", "o4.join/r.there", "o4.completions", "o4.commands"]
+    assert not refused(bundle)
+
+
 WARNED = """\
 firable: 1
 cell: warned
