@@ -25,7 +25,7 @@ from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.checking import check_bundle
 from firable.decompose.verification.documents import UNDECIDED
 from firable.decompose.verification.formulas import spelled
-from firable.decompose.verification.obligations import compared
+from firable.decompose.verification.obligations import check_obligations, compared
 from firable.decompose.verification.protocol import TITLE, blocks, published
 from firable.decompose.verification.recut import Cut, check_cut
 from firable.decompose.verification.refusal import NotShownError
@@ -328,6 +328,41 @@ def test_weaker_assertions_and_sly_commands_are_refused() -> None:
         assert family_refused("workshop-1", "eq7.smt2", changed)
 
 
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda head, first, *more: [head, *more, first], "' where 'eq7."),
+        (lambda head, first, *more: [head, first.replace('(echo "', '(echo "other.'), *more], "'other.*' where 'eq7."),
+        (lambda head, first, *more: [head, first.replace("; ", "; not "), *more], "states something else than"),
+        (lambda head, first, *more: [head.replace("; eq7", "; eq8"), first, *more], "does not say of what it is"),
+        (lambda *blocks: [*blocks[:-1], ""], "lacks the obligation"),
+        (lambda *blocks: [*(block.removesuffix("\n") for block in blocks), blocks[-1]], "which nobody demands"),
+    ],
+)
+def test_a_file_of_other_obligations_is_told_by_the_first_that_is_another(
+    change: Callable[..., list[str]], words: str
+) -> None:
+    bundle = bundled("workshop-1")
+    text = "\n\n".join(change(*bundle.evidence["eq7.smt2"].split("\n\n"))).replace("\n\n\n", "\n\n")
+    mutant = replace(bundle, evidence={**bundle.evidence, "eq7.smt2": text.rstrip("\n") + "\n"})
+    with pytest.raises(NotShownError, match=words):
+        compared(Examination(mutant), cut_of("workshop-1"), "eq7")
+
+
+@pytest.mark.parametrize(
+    "changed", [lambda said: said[:-1], lambda said: said[:-2], lambda said: (*said[2:], *said[:2]), lambda _: ()]
+)
+def test_answers_that_are_not_to_one_obligation_after_the_other_show_nothing(
+    changed: Callable[[tuple[str, ...]], tuple[str, ...]],
+) -> None:
+    examination = Examination(bundled("workshop-1"))
+    with pytest.raises(NotShownError, match=r"does not answer one obligation of 'eq7\.smt2' after the other"):
+        check_obligations(
+            examination, cut_of("workshop-1"), "z3", lambda *of: changed(SOLVERS["z3"](*of)), 10_000, ["eq7"]
+        )
+    assert examination.checked == {}
+
+
 @pytest.mark.usefixtures("remembering")
 @pytest.mark.parametrize("given_up", ["unknown", "unknown (TIMEOUT)", "unknown (INCOMPLETE)", "timeout"])
 def test_an_answer_that_refutes_is_refused_and_one_that_is_missing_only_claims(
@@ -339,7 +374,7 @@ def test_an_answer_that_refutes_is_refused_and_one_that_is_missing_only_claims(
         return {"cvc5": lambda text, ms: tuple(answer if line == "unsat" else line for line in answered(text, ms))}
 
     monkeypatch.setattr("firable.decompose.verification.checking.SOLVERS", saying("sat"))
-    with pytest.raises(InputError, match="is refuted: the solver says sat"):
+    with pytest.raises(InputError, match=r"'eq7\..*' is refuted: the solver says sat"):
         check_bundle(bundle)
     monkeypatch.setattr("firable.decompose.verification.checking.SOLVERS", saying(given_up))
     checked = check_bundle(bundle)
