@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -300,6 +301,45 @@ def test_whatever_is_related_is_bisimilar_though_refine_would_refuse_it() -> Non
             assert branching_bisimilar(*graphs, names, visible, divergence=settles), seed
     assert related > 8
     assert wrong > 5
+
+
+def judged(change: Callable[[tuple[str, ...]], tuple[str, ...]]) -> Examination:
+    """The bundle checked with other answers to its obligations."""
+
+    def answers(text: str, timeout_ms: int) -> tuple[str, ...]:
+        said = by_cvc5(text, timeout_ms)
+        return change(said) if text == bundled().evidence[OBLIGATIONS] else said
+
+    examination = Examination(bundled())
+    check_refinement(examination, "cvc5", answers, TIMEOUT_MS)
+    return examination
+
+
+@pytest.mark.usefixtures("remembering")
+def test_an_obligation_that_the_solver_refutes_is_refused_and_one_that_it_gives_up_leaves_what_rests_on_it_open() -> (
+    None
+):
+    assert all(one.shown for one in judged(lambda said: said).checked.values())
+    with pytest.raises(NotShownError, match=r"'contact\..*' of 'refinement\.smt2' is refuted: the solver says sat"):
+        judged(
+            lambda said: tuple("sat" if before.startswith("contact.") else one for before, one in pairwise(("", *said)))
+        )
+    open_ = {name: one for name, one in judged(lambda said: (*said[:-1], "unknown")).checked.items() if not one.shown}
+    resting = ("follows", "bisimilar", "carried.")
+    every = (verdict.name for verdict in bundled().verdicts if verdict.name.startswith(PREFIX))
+    assert set(open_) == {name for name in every if name.removeprefix(PREFIX).startswith(resting)}
+    assert {one.only_claimed for one in open_.values()} == {"cvc5 gave up"}
+
+
+@pytest.mark.usefixtures("remembering")
+@pytest.mark.parametrize(
+    "change", [lambda said: said[:-1], lambda said: said[:-2], lambda said: (*said[2:], *said[:2])]
+)
+def test_answers_that_are_not_to_one_obligation_after_the_other_show_no_refinement(
+    change: Callable[[tuple[str, ...]], tuple[str, ...]],
+) -> None:
+    with pytest.raises(NotShownError, match=r"does not answer one obligation of 'refinement\.smt2' after the other"):
+        judged(change)
 
 
 @pytest.mark.seeds
