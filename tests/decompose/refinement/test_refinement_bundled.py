@@ -28,10 +28,11 @@ from firable.decompose.refinement.naming import named
 from firable.decompose.refinement.opening import open_tasks
 from firable.decompose.refinement.refining import refine
 from firable.decompose.refinement.sealing import Origin, sealed
-from firable.decompose.verification import documents
+from firable.decompose.verification import documents, refinement
 from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.checking import check_bundle
 from firable.decompose.verification.closed_tasks import ClosedTask
+from firable.decompose.verification.documents import ShownRecord
 from firable.decompose.verification.naming_anew import Named
 from firable.decompose.verification.opening import Opening
 from firable.decompose.verification.refinement import (
@@ -329,6 +330,28 @@ def test_an_obligation_that_the_solver_refutes_is_refused_and_one_that_it_gives_
     every = (verdict.name for verdict in bundled().verdicts if verdict.name.startswith(PREFIX))
     assert set(open_) == {name for name in every if name.removeprefix(PREFIX).startswith(resting)}
     assert {one.only_claimed for one in open_.values()} == {"cvc5 gave up"}
+
+
+@pytest.mark.usefixtures("remembering")
+@pytest.mark.parametrize(
+    ("file", "verdict"), [(of_task("fetch"), "task.fetch.ends-clean"), (DOCUMENT, "conceptual.reversible")]
+)
+def test_what_rests_on_a_document_that_was_not_checked_in_time_is_only_claimed(
+    file: str, verdict: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def late(examination: Examination, of: str, *others: Any) -> list[ShownRecord]:
+        named = verdict.rpartition(".")[2] if of == file else "nothing"
+        return [
+            replace(one, shown=False, only_claimed="the time was over") if one.record.name.endswith(named) else one
+            for one in documents.checked_document(examination, of, *others)
+        ]
+
+    monkeypatch.setattr(refinement, "checked_document", late)
+    open_ = {name: one for name, one in judged(lambda said: said).checked.items() if not one.shown}
+    resting = ("follows", "bisimilar", "carried.")
+    every = [v.name for v in bundled().verdicts if v.name.removeprefix(PREFIX).startswith(resting)]
+    assert set(open_) == {f"{PREFIX}{verdict}", *every}
+    assert {one.only_claimed for one in open_.values()} == {"the time was over"}
 
 
 @pytest.mark.usefixtures("remembering")
