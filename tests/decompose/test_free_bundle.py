@@ -21,7 +21,7 @@ from firable.decompose.verification.free_parts import check_free_parts
 from firable.decompose.verification.obligations import check_obligations
 from firable.decompose.verification.recut import check_cut
 from firable.decompose.verification.refusal import NotShownError
-from firable.decompose.verification.solvers import SOLVERS
+from firable.decompose.verification.solvers import SOLVERS, Answers
 from firable.nets.bundle import Bundle, read_bundle, write_bundle
 from firable.nets.catalogue import catalogue_net
 from firable.nets.diagnostics import InputError
@@ -41,11 +41,11 @@ def saying(free: Free) -> Bundle:
     return replace(cell(), decomposition=replace(cell().decomposition, free=free))
 
 
-def judged(bundle: Bundle) -> None:
+def judged(bundle: Bundle, answers: Answers = SOLVERS["z3"]) -> None:
     """What `firable verify` does of free parts, without the other obligations on the split; raises `NotShownError`."""
     examination, cut = Examination(bundle), check_cut(bundle.decomposition)
     examination.used |= {file for file in bundle.evidence if file.endswith(".smt2")}
-    check_obligations(examination, cut, "z3", SOLVERS["z3"], 10_000, ["persistence"])
+    check_obligations(examination, cut, "z3", answers, 10_000, ["persistence"])
     check_verdicts_on_the_net(examination, SOLVERS["z3"], 10_000)
     check_free_parts(examination, cut)
 
@@ -150,6 +150,37 @@ def test_vote_that_arcs_and_units_show_needs_their_evidence() -> None:
     assert [problem.message for problem in unproved(replace(bundle, verdicts=bare))] == [
         "the vote on 't1-11' is said to be persistent without evidence"
     ]
+
+
+FALLS = """
+firable: 1
+cell: falls
+controllers:
+  sys: {coordinator: true}
+  a: {start: [p, r], places: {p: , q: , r: , s: }}
+  b: {start: x, places: {x: , y: }}
+transitions:
+  G: {number: 1, from: [a.p, b.x], to: [a.q, b.y], if: a.r}
+  H: {number: 2, from: [a.q, b.y], to: [a.p, b.x]}
+  u: {from: a.r, to: a.s}
+  v: {from: a.s, to: a.r}
+"""
+"""By its arcs the part of G at a disturbs nobody, and its vote falls when u fires."""
+
+
+def test_a_part_that_disturbs_nobody_is_not_free_where_its_vote_is_shown_to_fall() -> None:
+    bundle = make_bundle(check(parse_net(FALLS)))
+    assert bundle.decomposition.free == (("G", "b"), ("H", "a"), ("H", "b"))
+    judged(bundle)
+    saying_so = replace(bundle.decomposition, free=(("G", "a"), *bundle.decomposition.free))
+    with pytest.raises(NotShownError, match="'t1-11' is not free of promise: it is not shown that its vote is"):
+        judged(replace(bundle, decomposition=saying_so))
+
+
+def test_a_part_is_not_free_where_the_solver_gave_up_that_its_vote_is_persistent() -> None:
+    bundle = make_bundle(check(BY_A_UNIT))
+    with pytest.raises(NotShownError, match="'t1-11' is not free of promise: it is not shown that its vote is"):
+        judged(bundle, lambda *of: tuple("unknown" if one == "unsat" else one for one in SOLVERS["z3"](*of)))
 
 
 CLASH = """
