@@ -361,8 +361,21 @@ def test_a_family_that_was_left_out_with_its_evidence_claims_nothing() -> None:
     assert all(one.shown for one in check_bundle(replace(bundle, verdicts=verdicts, evidence=evidence)))
 
 
-@pytest.mark.parametrize("kind", ["keeps.decide/hand_over", "home", "way.fetch", "one-token.fire/unload", "divergence"])
-def test_an_answer_that_refutes_is_refused_and_a_missing_one_only_claims(kind: str) -> None:
+@pytest.mark.parametrize(
+    ("kind", "of"),
+    [
+        ("starts", 5),
+        ("keeps.decide/hand_over", 5),
+        ("follows", 2),
+        ("agrees", 1),
+        ("home", 1),
+        ("homeward.close/hand_over", 1),
+        ("way.fetch", 1),
+        ("one-token.fire/unload", 1),
+        ("divergence", 1),
+    ],
+)
+def test_an_answer_that_refutes_is_refused_and_a_missing_one_only_claims(kind: str, of: int) -> None:
     bundle = bundled("shuttle")
 
     def saying(answer: str) -> Callable[[str, int], tuple[str, ...]]:
@@ -381,8 +394,22 @@ def test_an_answer_that_refutes_is_refused_and_a_missing_one_only_claims(kind: s
     check_explored(examination, cut, "cvc5", saying("unknown"), TIMEOUT_MS)
     late = {one.verdict.name for one in examination.checked.values() if one.only_claimed == "cvc5 gave up"}
     assert late == {one.verdict.name for one in examination.checked.values() if not one.shown}
-    of = {"keeps": 5, "home": 1, "way": 1, "one-token": 1, "divergence": 1}[kind.partition(".")[0]]
     assert len([name for name in late if name.startswith("explored.")]) == of
+
+
+@pytest.mark.parametrize(
+    "change", [lambda said: said[:-1], lambda said: said[:-2], lambda said: (*said[2:], *said[:2])]
+)
+def test_answers_that_are_not_to_one_obligation_after_the_other_show_nothing(
+    change: Callable[[tuple[str, ...]], tuple[str, ...]],
+) -> None:
+    bundle = bundled("shuttle")
+    examination = Examination(bundle)
+    with pytest.raises(NotShownError, match=r"does not answer one obligation of 'explored\.smt2' after the other"):
+        check_explored(
+            examination, check_cut(bundle.decomposition), "cvc5", lambda *of: change(answered(*of)), TIMEOUT_MS
+        )
+    assert examination.checked == {}
 
 
 @pytest.mark.parametrize("solver", [by_cvc5, by_z3])

@@ -26,7 +26,7 @@ from firable.decompose.verification.checking import check_bundle
 from firable.decompose.verification.documents import UNDECIDED
 from firable.decompose.verification.formulas import spelled
 from firable.decompose.verification.obligations import check_obligations, compared
-from firable.decompose.verification.protocol import TITLE, blocks, published
+from firable.decompose.verification.protocol import TITLE, blocks, check_protocol, published
 from firable.decompose.verification.recut import Cut, check_cut
 from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.restating import HEADS
@@ -138,6 +138,24 @@ def test_another_theorem_on_the_protocol_is_refused() -> None:
         assert changed != text
         with pytest.raises(InputError, match="is not the theorem on the protocol"):
             check_bundle(replace(bundle, evidence={**bundle.evidence, "protocol.smt2": changed}))
+
+
+@pytest.mark.usefixtures("remembering")
+def test_the_theorem_on_the_protocol_needs_an_answer_to_each_of_its_obligations() -> None:
+    def judged(change: Callable[[tuple[str, ...]], tuple[str, ...]]) -> Examination:
+        examination = Examination(bundled("conceptual_one_robot"))
+        check_protocol(examination, "cvc5", lambda *of: change(answered(*of)), 10_000)
+        return examination
+
+    names = [name for name, _ in blocks()]
+    assert [(name, one.shown) for name, one in judged(lambda said: said).checked.items()] == [(n, True) for n in names]
+    with pytest.raises(NotShownError, match=f"'{names[-1]}' is refuted: the solver says sat"):
+        judged(lambda said: (*said[:-1], "sat"))
+    late = [one for one in judged(lambda said: (*said[:-1], "unknown")).checked.values() if not one.shown]
+    assert [(one.verdict.name, one.method, one.only_claimed) for one in late] == [(names[-1], NOTHING, "cvc5 gave up")]
+    for changed in (lambda said: said[:-1], lambda said: said[:-2], lambda said: (*said[2:], *said[:2])):
+        with pytest.raises(NotShownError, match=r"does not answer one obligation of 'protocol\.smt2' after the other"):
+            judged(changed)
 
 
 # --------------------------------------------------------------------------------------------------------------------
