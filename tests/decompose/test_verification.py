@@ -434,6 +434,29 @@ def test_a_solver_that_cannot_read_an_obligation_of_a_document_is_no_internal_er
         check_bundle(bundle)
 
 
+@pytest.mark.usefixtures("remembering")
+def test_an_obligation_of_a_document_that_the_solver_refutes_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    bundle, files = bundled("conceptual_one_robot"), set(bundled("conceptual_one_robot").evidence.values())
+    asked: list[str] = []
+
+    def saying(answer: str, of: str = "") -> dict[str, Callable[[str, int], tuple[str, ...]]]:
+        def solver(text: str, timeout_ms: int) -> tuple[str, ...]:
+            said = answered(text, timeout_ms)
+            if text not in files and said:
+                asked.append(text)
+            return (*said[:-1], answer) if text == of else said
+
+        return {"cvc5": solver}
+
+    monkeypatch.setattr("firable.decompose.verification.checking.SOLVERS", saying("unsat"))
+    check_bundle(bundle)
+    assert len(asked) == len(set(asked)) > 5
+    for text in (asked[0], asked[len(asked) // 2], asked[-1]):
+        monkeypatch.setattr("firable.decompose.verification.checking.SOLVERS", saying("sat", text))
+        with pytest.raises(InputError, match=r"an obligation of 'check\.evidence\.json' on '.*' is refuted"):
+            check_bundle(bundle)
+
+
 RESERVED = (".p", "..", "true", "false", "not", "and", "or", "xor", "distinct", "ite", "as", "_", "=", "%2e.p", "let")
 
 
