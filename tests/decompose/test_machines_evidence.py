@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import cache
 from hashlib import sha256
+from typing import Any
 
 import pytest
 from support import inspected_cell, together_cell
@@ -237,6 +238,62 @@ def test_gates_of_a_part_that_awaits_two_completions_are_asked_as_the_prover_ask
     asked = [verdict.name for verdict in bundle.verdicts if verdict.name.startswith("o4.")]
     assert asked == ["o4.begin/r.entry", "o4.join/r.here", "o4.join/r.there", "o4.completions", "o4.commands"]
     assert not refused(bundle)
+
+
+@pytest.mark.usefixtures("remembering", "unchanged")
+@pytest.mark.parametrize(
+    ("file", "record", "verdict"),
+    [
+        (O4, "o4.completion.1", "o4.completions"),
+        (O4, "o4.join/r.there", "o4.join/r.there"),
+        (LOOP, "loop.gate.0", "loop.gates-open"),
+        (LOOP, "loop.live.2", "loop.live"),
+    ],
+)
+def test_a_verdict_is_not_proved_by_a_document_that_leaves_one_of_its_questions_out(
+    file: str, record: str, verdict: str
+) -> None:
+    bundle = make_bundle(check(parse_net(JOINING)), plant=ITS_MACHINES)
+    document = document_from_text(bundle.evidence[file])
+    records = tuple(one for one in document.records if one.name != f"property.{record}")
+    assert len(records) == len(document.records) - 1
+    fewer = replace(bundle, evidence={**bundle.evidence, file: replace(document, records=records).to_text()})
+    with pytest.raises(NotShownError, match=f"the verdict on '{verdict}' is not what its proof shows"):
+        check_machines(Examination(fewer), Cut(bundle.net), answered, TIMEOUT_MS)
+
+
+@pytest.mark.usefixtures("remembering", "unchanged")
+@pytest.mark.parametrize(
+    ("left", "status", "said"),
+    [
+        ([], Status.UNKNOWN, "undecided: the bundle itself does not say"),
+        ([Record("property.loop.live.2", True, (), "no time")], Status.PROVED, "only claimed: no time"),
+    ],
+)
+def test_a_verdict_of_which_a_question_is_open_or_without_evidence_names_none_and_is_only_claimed(
+    left: list[Record], status: Status, said: str
+) -> None:
+    bundle = make_bundle(check(parse_net(JOINING)), plant=ITS_MACHINES)
+    document = document_from_text(bundle.evidence[LOOP])
+    records = [r for one in document.records for r in (left if one.name == "property.loop.live.2" else [one])]
+    evidence = {**bundle.evidence, LOOP: replace(document, records=tuple(records)).to_text()}
+
+    def judged(**told: Any) -> Examination:
+        verdicts = tuple(replace(v, **told) if v.name == "loop.live" else v for v in bundle.verdicts)
+        examination = Examination(replace(bundle, verdicts=verdicts, evidence=evidence))
+        check_machines(examination, Cut(bundle.net), answered, TIMEOUT_MS)
+        return examination
+
+    bound = machines.UNDECIDED if status is Status.UNKNOWN else ""
+    checked = judged(status=status, bound=bound, evidence=()).checked
+    assert [(name, one.only_claimed) for name, one in checked.items() if not one.shown] == [("loop.live", said)]
+    for wrong in (
+        {"status": status, "bound": bound},
+        {"status": status, "bound": "all is well", "evidence": ()},
+        {"status": Status.VIOLATED, "evidence": ()},
+    ):
+        with pytest.raises(NotShownError, match=r"the verdict on 'loop\.live' is not what its proof shows"):
+            judged(**wrong)
 
 
 WARNED = """\
