@@ -9,10 +9,11 @@ from typing import Any
 import pytest
 from support.bundle_mutants import decomposition_mutants, evidence_mutants, line_mutants, verdict_mutants
 from support.examples import some
-from support.remembered import answered
+from support.remembered import answered, examined
 
 from firable.analysis.check import check
-from firable.analysis.evidence.document import document_from_text
+from firable.analysis.evidence.checking.checker import CheckedRecord
+from firable.analysis.evidence.document import Document, document_from_text
 from firable.analysis.induction.smt import symbol
 from firable.analysis.spaces.reachability import Budget
 from firable.decompose.bundling import make_bundle
@@ -23,7 +24,7 @@ from firable.decompose.splitting.cut import split
 from firable.decompose.verification import documents
 from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.checking import check_bundle
-from firable.decompose.verification.documents import UNDECIDED
+from firable.decompose.verification.documents import UNDECIDED, check_verdicts_on_the_net
 from firable.decompose.verification.formulas import spelled
 from firable.decompose.verification.obligations import check_obligations, compared
 from firable.decompose.verification.protocol import TITLE, blocks, check_protocol, published
@@ -554,6 +555,36 @@ def test_a_verdict_that_nobody_knows_is_refused(status: Status) -> None:
     safe = Verdict("safe", status, "certified SIL 3", "", Weight.INFORMATION)
     with pytest.raises(InputError, match="nobody knows what 'safe' is on"):
         check_bundle(replace(bundle, verdicts=(*bundle.verdicts, safe)))
+
+
+@pytest.mark.usefixtures("remembering")
+def test_a_verdict_on_the_vote_of_nobody_is_refused() -> None:
+    bundle = bundled("workshop-1")
+    vote = next(v for v in bundle.verdicts if v.name.startswith("persistent."))
+    nobody = replace(vote, name="persistent.t9-99", status=Status.UNKNOWN, evidence=())
+    with pytest.raises(InputError, match=r"'persistent\.t9-99' is on no part"):
+        check_bundle(replace(bundle, verdicts=(*bundle.verdicts, nobody)))
+
+
+def test_what_a_document_shows_that_was_not_checked_in_time_is_only_claimed(monkeypatch: pytest.MonkeyPatch) -> None:
+    bundle = bundled("one_robot")
+    votes = [v.name for v in bundle.verdicts if v.name.startswith("persistent.") and not rests_on_an_obligation(v)]
+    assert votes == ["persistent.t1-21", "persistent.t1-41"]
+
+    def late(document: Document, timeout_ms: int) -> Iterator[CheckedRecord]:
+        for one in examined(document, timeout_ms):
+            open_ = one.record.name in ("", "live")  # what has no name is on votes
+            yield replace(one, shown=False, only_claimed="the time was over") if open_ else one
+
+    monkeypatch.setattr(documents, "check_document", late)
+    monkeypatch.setattr(documents, "obligations", lambda *_, **__: ())
+    examination = Examination(bundle)
+    examination.used |= {file for file in bundle.evidence if file.endswith(".smt2")}
+    for verdict in filter(rests_on_an_obligation, bundle.verdicts):
+        examination.judge(verdict, shown=True, method="the tests above")
+    check_verdicts_on_the_net(examination, answered, 10_000)
+    open_ = {name: one.only_claimed for name, one in examination.checked.items() if not one.shown}
+    assert open_ == dict.fromkeys((*votes, "live"), "the time was over")
 
 
 @pytest.mark.parametrize("name", ["workshop-6", "philosophers-4"])
