@@ -566,6 +566,20 @@ def test_a_verdict_on_the_vote_of_nobody_is_refused() -> None:
         check_bundle(replace(bundle, verdicts=(*bundle.verdicts, nobody)))
 
 
+@pytest.mark.usefixtures("remembering")
+def test_a_vote_that_was_taken_out_with_its_evidence_is_missed() -> None:
+    bundle = bundled("one_robot")
+    (first, second) = (v for v in bundle.verdicts if v.name in {"persistent.t1-21", "persistent.t1-41"})
+    assert first.evidence == second.evidence
+    (file,) = first.evidence
+    document = document_from_text(bundle.evidence[file])
+    assert [record.name for record in document.records] == ["", ""]
+    text = replace(document, records=document.records[1:]).to_text()
+    verdicts = tuple(v for v in bundle.verdicts if v is not first)
+    with pytest.raises(InputError, match=r"there is no verdict on 'persistent\.t1-21'"):
+        check_bundle(replace(bundle, verdicts=verdicts, evidence={**bundle.evidence, file: text}))
+
+
 def test_what_a_document_shows_that_was_not_checked_in_time_is_only_claimed(monkeypatch: pytest.MonkeyPatch) -> None:
     bundle = bundled("one_robot")
     votes = [v.name for v in bundle.verdicts if v.name.startswith("persistent.") and not rests_on_an_obligation(v)]
