@@ -538,6 +538,24 @@ def test_protocol_proof_says_of_a_split_what_it_says_where_all_that_it_assumes_i
     assert protocol_lines(decomposition, (*verdicts, *side)) == [("unknown", doubted)] * 2
     o2 = tuple(v for v in verdicts if not v.name.startswith("o2."))
     assert protocol_lines(decomposition, o2) == [("by the protocol proof", "protocol")] * 2
+    (owned,) = (v for v in verdicts if v.name == "ownership")
+    doubted = "protocol, which assumes of the split what is not proved here: ownership"
+    twice = (*verdicts, replace(owned, status=Status.VIOLATED))
+    assert protocol_lines(decomposition, twice) == [("unknown", doubted)] * 2, "proved and violated is not proved"
+    broken = (replace(v, status=Status.VIOLATED) if v.name.startswith("protocol.") else v for v in verdicts)
+    assert protocol_lines(decomposition, [v for v in broken if v is not owned]) == [("violated", doubted)] * 2
+
+
+@pytest.mark.parametrize(
+    ("of_one", "says"),
+    [(Status.PROVED, "shown in the loop"), (Status.UNKNOWN, "unknown"), (Status.VIOLATED, "violated")],
+)
+def test_gates_stay_open_where_the_machines_show_it_of_each(of_one: Status, says: str) -> None:
+    decomposition = split(catalogue_net("one_robot"))
+    verdicts = [Verdict(f"o4.{name}", Status.PROVED, "it stays open", "the loop") for name in ("one", "two", "three")]
+    verdicts[1] = replace(verdicts[1], status=of_one)
+    (line,) = (one for one in standing(decomposition, verdicts) if one.name == "O4")
+    assert (line.status, line.by) == (says, "with the machines that were given")
 
 
 @pytest.mark.parametrize(
