@@ -179,18 +179,23 @@ class Plant(Things):
         if not late <= {*self.late}:
             raise DiffersError(f"{', '.join(sorted(late - {*self.late}))} may be told late, and was not expected to be")
         ways: list[Changes] = [{}]
-        for name in new.keys() & {*self.late}:
+        for name in sorted(new.keys() & {*self.late}, key=lambda one: one in self.completions):
             told, news = f"told {name}", f"news of {name}"
             is_known = bool(state[told]) == new[name]
             if state[news]:  # it is again what the controller knows, or other news is still to come
                 stay: list[Changes] = [{}] if name not in self.completions else []
                 over: list[Changes] = [{news: False}] if is_known else []
                 ways = [{**way, **one} for way in ways for one in (*stay, *over)]
-            elif name in late:
-                at_once: list[Changes] = [{told: new[name]}] if late == {name} & {*self.completions} else []
-                ways = [{**way, **one} for way in ways for one in ({news: True}, *(at_once if not is_known else ()))]
-            else:  # what is no news is known
-                ways = [{**way, told: new[name]} for way in ways if not is_known]
+                continue
+            next_: list[Changes] = []
+            for way in ways:
+                is_behind = any(_Overlaid(way, state)[f"news of {one}"] for one in self.told_before.get(name, ()))
+                waits = new[name] and is_behind
+                if name in late or waits:
+                    next_.append({**way, news: True})
+                if (name not in late or late == {name} & {*self.completions}) and not waits and not is_known:
+                    next_.append({**way, told: new[name]})  # what is no news is known
+            ways = next_
         yield from (changes | way for way in ways)
 
     def told(self, name: str, state: State) -> Iterator[Changes]:

@@ -307,6 +307,7 @@ class Things:
     def late(self) -> tuple[str, ...]:
         """The signals that a controller may be told later than they change."""
         late = {signal for instant in self.instants() for signal in self.told_late(*instant)}
+        late |= {name for name, seeing in self.seen_with.items() if seeing & late}
         return tuple(signal.name for signal in self.net.signals if signal.name in late)
 
     @cached_property
@@ -336,11 +337,16 @@ class Things:
     def told_before(self) -> dict[str, list[str]]:
         """For each completion the sensors that may change with it: when a controller is told of it, it has been told of
         them."""
+        return {name: [one for one in self.late if one in seeing] for name, seeing in self.seen_with.items()}
+
+    @cached_property
+    def seen_with(self) -> dict[str, set[str]]:
+        """For each completion the sensors that may change with it."""
         found = {name: set[str]() for name in self.completions}
         for place in self.commanding:
             if place.completion is not None:
                 found[place.completion] |= {name for name, _ in self.shows_done(place)}
-        return {name: [one for one in self.late if one in seen] for name, seen in found.items()}
+        return found
 
     def instants(self) -> Iterator[tuple[list[tuple[str, bool]], list[Place]]]:
         """The signals that change in one instant, and to what, with the place whose command is sent or done in it."""

@@ -74,6 +74,7 @@ class Telling:
         by_commands = ((changes, (place,)) for place in self.laws.commanding for changes in self._by(place))
         by_themselves = ((changes, ()) for changes in self._by_themselves())
         found = frozenset[str]().union(*(self.told_late(*one) for one in chain(by_commands, by_themselves)))
+        found |= {name for name, seeing in self._seeing.items() if seeing & found}
         return tuple(signal.name for signal in self.laws.net.signals if signal.name in found)
 
     @cached_property
@@ -97,11 +98,16 @@ class Telling:
     def behind(self) -> dict[str, tuple[str, ...]]:
         """For each completion the sensors that may change with it, and that are told late: nothing of them is news when
         it is told."""
+        return {name: tuple(one for one in self.late if one in seeing) for name, seeing in self._seeing.items()}
+
+    @cached_property
+    def _seeing(self) -> dict[str, set[str]]:
+        """For each completion the sensors that may change with it."""
         found: dict[str, set[str]] = {}
         for place in self.laws.commanding:
             if place.completion is not None:
                 found.setdefault(place.completion, set()).update(signal for signal, _ in self._effect(place))
-        return {name: tuple(one for one in self.late if one in seen) for name, seen in found.items()}
+        return found
 
     def _by(self, place: Place) -> Iterator[list[Change]]:
         """What changes together as the command of a place is sent, and as it is done."""
@@ -254,13 +260,15 @@ class Telling:
         if not late <= {*self.late}:
             raise RuntimeError(f"{', '.join(sorted(late - {*self.late}))} may be told late, and was not expected to be")
         moments = [moment]
-        for signal, value in changes.items():
+        for signal in sorted(changes, key=self.completions.__contains__):
             if signal not in self.late:
                 continue
-            news = _news(signal)
-            at_once = Case(((news, False), *_knows(signal, value=not value)), _knows(signal, value=value))
+            news, value = _news(signal), changes[signal]
+            told = Case(((news, False), *_knows(signal, value=not value)), _knows(signal, value=value))
             later = Case(((news, False),), ((news, True),))
-            ways = [later] if signal in late else [at_once]
+            behind = self.behind.get(signal, ()) if value else ()
+            at_once = told.with_(self.is_told(*behind))
+            ways = [later] if signal in late else [at_once, *self._behind(signal, later, behind)]
             if late == {signal} and signal in self.completions:
                 ways = [at_once, replace(later, tag=f"{signal}-late")]
             ways.append(Case(((news, True), *_knows(signal, value=value)), ((news, False),), f"{signal}-untold"))
@@ -283,6 +291,13 @@ class Telling:
             ways.append(Case((untold, *none, (news, True)), (), f"not-yet-{signal}"))
             none.append((news, False))
         return each([moment], [Case((untold, *none), ((_UNTOLD, False),)), *ways])
+
+    def _behind(self, signal: str, later: Case, sensors: Iterable[str]) -> Iterator[Case]:
+        """A completion is told later where there is news of one of some sensors first."""
+        before = list[Literal]()
+        for one in sensors:
+            yield later.with_(Case((*before, (_news(one), True)), tag=f"{signal}-behind-{one}"))
+            before.append((_news(one), False))
 
     def sent(self, moment: Moment, places: Iterable[Place]) -> list[Moment]:
         """A firing, with what controllers are told of it, in which machines take the commands of some places in turn.

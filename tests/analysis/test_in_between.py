@@ -14,6 +14,7 @@ from support.between_cells import (
     found_good,
     in_between,
     judged,
+    leaving,
     mixed_up,
     overdue,
     timed_out,
@@ -26,6 +27,7 @@ from support.physical_cell import reached
 
 from firable.analysis.loop.verdicts import LoopReport, check_loop
 from firable.decompose.verification.happenings import Plant
+from firable.decompose.verification.plant import DiffersError
 from firable.decompose.verification.same_loop import compare
 from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.machines.closing import close
@@ -129,6 +131,18 @@ def test_who_takes_the_token_before_the_completion_is_told_goes_by_what_was_seen
     waited_for = frozenset(place.name for place in cell[0].places if place.completion is not None)
     monkeypatch.setattr(Excluding, "announced", waited_for)
     assert check_loop(*cell).verdict("loop.accidents").holds
+
+
+def test_a_completion_is_told_behind_news_that_was_there_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert check_loop(*leaving()).verdict("loop.accidents").holds
+    for sending in Sending:
+        plant, loop = Plant(*leaving(), sending), close(*leaving(), sending=sending)
+        assert any("belt.carried-behind-belt.exit" in t.name for t in loop.net.transitions)
+        assert compare(plant, loop)
+        with monkeypatch.context() as patch:
+            patch.setattr(Telling, "_behind", lambda *_: iter(()))
+            with pytest.raises(DiffersError):
+                compare(plant, close(*leaving(), sending=sending))
 
 
 def test_a_sensor_that_flickers_as_a_workpiece_goes_may_be_told_to_have_come_back() -> None:

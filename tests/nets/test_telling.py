@@ -49,9 +49,9 @@ def test_a_cell_that_fires_between_two_signals_of_one_instant_is_found(monkeypat
 @pytest.mark.parametrize(
     ("gates", "expected"),
     [
-        ("unless: [robot.entry, robot.holds]", ["robot.entry", "robot.holds", "robot.grasped"]),
+        ("unless: [robot.entry, robot.holds]", ["robot.entry", "robot.holds", "robot.grasped", "robot.placed"]),
         ("if: robot.entry", ["robot.entry", "robot.grasped"]),
-        ("unless: robot.holds", ["robot.holds", "robot.grasped"]),
+        ("unless: robot.holds", ["robot.holds", "robot.grasped", "robot.placed"]),
         ("if: robot.holds", []),
     ],
     ids=["both", "the entry", "the hand", "the hand while it is full"],

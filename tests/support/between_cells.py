@@ -459,3 +459,43 @@ def bouncing(extra: str = ", may_flicker: true") -> tuple[Net, PlantModel]:
     """A belt is told to carry the next workpiece when a sensor comes back, which has flickered as the last one went."""
     plant = BOUNCING_PLANT.replace("{occupied: entry}", f"{{occupied: entry{extra}}}")
     return parse_net(BOUNCING_NET), parse_plant(plant)
+
+
+LEAVING_NET = """firable: 1
+cell: leaving
+controllers:
+  belt:
+    start: [rest, calm]
+    inputs: [entry, exit]
+    places:
+      rest:
+      first:  {send: {machine: B, command: RUN}, until: carried}
+      second: {send: {machine: B, command: RUN}, until: carried}
+      wait:
+      third:  {send: {machine: A, command: RUN}, until: brought}
+      calm:
+      seen:
+transitions:
+  go:   {from: belt.rest, to: belt.first, if: belt.entry}
+  more: {from: belt.first, to: belt.second, if: belt.entry}
+  end:  {from: belt.second, to: belt.wait}
+  last: {from: belt.wait, to: belt.third, if: belt.entry, unless: belt.exit}
+  see:  {from: belt.calm, to: belt.seen, if: belt.exit}
+"""
+LEAVING_PLANT = """firable_plant: 1
+plant: leaving
+stations: [entry, exit]
+arrivals:   {station: entry, every_s: 5}
+departures: {station: exit, raw: true}
+machines:
+  A: {commands: {RUN: {does: carry, from: entry, to: exit, takes_s: 4}}}
+  B: {commands: {RUN: {does: carry, from: entry, to: exit, takes_s: 4, when_full: wait}}}
+sensors:
+  belt.entry: {occupied: entry}
+  belt.exit:  {occupied: exit}
+"""
+
+
+def leaving() -> tuple[Net, PlantModel]:
+    """A workpiece leaves, and the next one is laid down, before a controller is told of the one or the other."""
+    return parse_net(LEAVING_NET), parse_plant(LEAVING_PLANT)
