@@ -21,6 +21,7 @@ from firable.nets.machines.moment import Case
 from firable.nets.machines.plant_file import PlantModel
 from firable.nets.machines.telling import Telling
 from firable.nets.net import Net
+from firable.nets.text import parse_net
 
 CELLS: dict[str, Callable[[], tuple[Net, PlantModel]]] = {
     **{one.__name__: one for one in (beside, blind, bouncing, by_sensors, leaving, twice)},
@@ -32,6 +33,21 @@ CELLS: dict[str, Callable[[], tuple[Net, PlantModel]]] = {
     "one_robot": lambda: (catalogue_net("one_robot"), catalogue_plant("one_robot")),
     "rejecting": lambda: (rejecting_cell.net(), rejecting_cell.plant()),
 }
+
+
+def judged() -> tuple[Net, PlantModel]:
+    """The completion of a command is formed with what a camera finds, and there is a time limit for it."""
+    net = rejecting_cell.NET.replace("until: cut}", "until: cut, within: 9s}")
+    sensor = "  cell.nok: {fails: entry}\n"
+    return parse_net(net), rejecting_cell.plant(
+        rejecting_cell.PLANT.replace(sensor, f"{sensor}  cell.cut: {{passes: table}}\n")
+    )
+
+
+@pytest.mark.parametrize("sending", Sending)
+def test_a_completion_that_a_camera_forms_is_told(sending: Sending) -> None:
+    assert not differ(*judged(), sending)
+    assert any("cell.freeing" in one for one in reached(close(*judged(), sending=sending), 10_000) or ())
 
 
 def differ(net: Net, model: PlantModel, sending: Sending) -> bool:

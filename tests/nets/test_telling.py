@@ -193,7 +193,7 @@ def read(where: str, gate: str, sensor: str, saw: str = "") -> tuple[Net, PlantM
 @pytest.mark.parametrize(
     ("where", "gate", "sensor", "expected"),
     [
-        ("WATCH", "unless: belt.one", "{holding: B}", ["belt.one"]),
+        ("WATCH", "unless: belt.one", "{holding: B}", ["belt.one", "belt.brought"]),
         ("WATCH", "if: belt.one", "{holding: B}", ["belt.one", "belt.brought"]),
         ("WATCH", "if: belt.one", "{holding: B, may_linger: true}", ["belt.one"]),
         ("WATCH", "unless: belt.brought", "", ["belt.brought"]),
@@ -201,11 +201,11 @@ def read(where: str, gate: str, sensor: str, saw: str = "") -> tuple[Net, PlantM
         ("THEN", "unless: belt.brought", "{occupied: table}", ["belt.brought"]),
         ("THEN", "if: belt.brought", "{occupied: table, may_flicker: true}", []),
         ("END", "unless: belt.one", "{occupied: table}", []),
-        ("END", "unless: belt.one", "{occupied: table, may_flicker: true}", ["belt.one"]),
-        ("END", "if: belt.one", "{occupied: table, may_flicker: true}", ["belt.one"]),
+        ("END", "unless: belt.one", "{occupied: table, may_flicker: true}", ["belt.one", "belt.brought"]),
+        ("END", "if: belt.one", "{occupied: table, may_flicker: true}", ["belt.one", "belt.brought"]),
         ("END", "if: belt.one", "{occupied: table}", []),
-        ("END", "if: belt.one", "{occupied: table, may_linger: true}", ["belt.one"]),
-        ("END", "leaves if: belt.one", "{occupied: table}", ["belt.one"]),
+        ("END", "if: belt.one", "{occupied: table, may_linger: true}", ["belt.one", "belt.brought"]),
+        ("END", "leaves if: belt.one", "{occupied: table}", ["belt.one", "belt.brought"]),
         ("END", "unless: belt.one", "{passes: table}", ["belt.one"]),
         ("END", "if: belt.one", "{passes: table}", []),
         ("END", "leaves if: belt.one", "{fails: table}", ["belt.one"]),
@@ -227,6 +227,6 @@ def test_what_a_machine_still_does_after_a_stop_is_told_late_whoever_waits_for_i
     stopped = "{send: {machine: B, command: HALT}, until: at_rest}"
     net, plant = read("END", "unless: belt.one", "{occupied: table}", stopped)
     loop = close(net, plant)
-    assert late(loop) == ["belt.one"]
+    assert late(loop) == ["belt.one", "belt.brought"]
     assert "plant.belt.one.news" in loop.net.transition("B/still-done/belt.running").outputs
     assert compare(Plant(net, plant, Sending.AT_ONCE), loop)
