@@ -353,10 +353,11 @@ class Plant(Things):
         return changes | {f"judged {station}": None for station in stations & self.judged}
 
     def judges(self, station: str, state: State) -> Iterator[Changes]:
-        """A workpiece that lies there, and was not judged, is good or bad, once it is told that it lies there."""
+        """A workpiece that lies there, and was not judged, is good or bad, once both are told."""
         judged = f"judged {station}"
-        sees = [name for name in self.late if name in self.model.sensors]
-        if any(self.model.sensors[name].occupied == station and state[f"news of {name}"] for name in sees):
+        sees = {name for name, sensor in self.model.sensors.items() if sensor.occupied == station}
+        sees |= {*self.judging(station)}
+        if any(state[f"news of {name}"] for name in self.late if name in sees):
             return
         if state[f"has {station}"] is not None and state[judged] is None:
             yield {judged: GOOD}

@@ -11,7 +11,7 @@ Meanwhile anything else may happen: the cell fires and sends commands, a workpie
 a signal takes less time than a command: while a machine is at one there is a moment at which all is told. So a machine
 that is given a command while there is news is *starting* until there is none, and does not get done before; nor before
 a key is told of that its command has released. Of what a stop breaks off nothing is assumed. And a camera takes longer
-to judge a workpiece than its controller to be told that it lies there.
+to judge a workpiece than its controller to be told that it lies there, and that the one before was judged no more.
 
 What closes a gate is told late, sensor or completion, also where nothing else changes, and a completion behind a sensor
 that does. What only opens gates is told in the instant itself: who fires later for it could have waited. So is what
@@ -206,8 +206,9 @@ class Telling:
         return Case(tuple((_news(signal), False) for signal in signals if signal in self.late))
 
     def is_seen(self, station: str) -> Case:
-        """Controllers are still to be told nothing of whether there is a workpiece on a station."""
-        return self.is_told(*(name for name, sensor in self.laws.model.sensors.items() if sensor.occupied == station))
+        """Controllers are still to be told nothing of whether a workpiece lies on a station, and what it was found."""
+        there = (name for name, sensor in self.laws.model.sensors.items() if sensor.occupied == station)
+        return self.is_told(*dict.fromkeys((*there, *self._judging(station))))
 
     def places(self) -> Iterator[Place]:
         """What controllers were told of signals that are told late, and of which there is news."""

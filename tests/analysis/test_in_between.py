@@ -7,6 +7,7 @@ from support.between_cells import (
     at_rest,
     beside,
     blind,
+    both,
     bouncing,
     by_sensors,
     done,
@@ -93,8 +94,9 @@ def test_no_machine_is_done_with_what_it_was_told_to_do_in_between(monkeypatch: 
         (done_when_the_next_has_come(), "behind", {}),
         (at_rest(), "is_under_way", lambda self, _: Case(((self.starting["R"], False),))),
         (judged(), "is_seen", lambda *_: Case()),
+        (both(), "is_seen", lambda *_: Case()),
     ],
-    ids=["done", "shown by a sensor", "at rest after a stop", "judged"],
+    ids=["done", "shown by a sensor", "at rest after a stop", "judged", "judged before"],
 )
 def test_who_is_told_that_something_is_done_or_judged_was_told_before_what_can_be_seen_of_it(
     cell: tuple[Net, PlantModel], rule: str, instead: object, monkeypatch: pytest.MonkeyPatch

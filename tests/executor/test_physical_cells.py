@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 from support import inspected_cell, rejecting_cell
-from support.between_cells import beside, blind, bouncing, by_sensors, in_between, leaving, twice
+from support.between_cells import beside, blind, both, bouncing, by_sensors, in_between, leaving, twice
 from support.drawn_cells import drawn_cell
 from support.examples import seeds
 from support.physical_cell import PhysicalCell, reached
@@ -24,7 +24,7 @@ from firable.nets.net import Net
 from firable.nets.text import parse_net
 
 CELLS: dict[str, Callable[[], tuple[Net, PlantModel]]] = {
-    **{one.__name__: one for one in (beside, blind, bouncing, by_sensors, leaving, twice)},
+    **{one.__name__: one for one in (beside, blind, both, bouncing, by_sensors, leaving, twice)},
     **{one.__name__: one for one in (carried, stopped, together, belts)},
     "pressed": lambda: in_between("{acknowledges: B}"),
     "flickering": lambda: in_between("{occupied: entry, may_flicker: true}"),

@@ -247,6 +247,32 @@ sensors:
 """
 
 
+BOTH_NET = """firable: 1
+cell: judged
+controllers:
+  eye: {start: rest, inputs: [good, bad], places: {rest: , odd: }}
+transitions:
+  odd: {from: eye.rest, to: eye.odd, if: [eye.good, eye.bad]}
+properties:
+  never_odd: {never: eye.odd}
+"""
+BOTH_PLANT = """firable_plant: 1
+plant: judged
+stations: [entry]
+arrivals:   {station: entry, every_s: 5}
+departures: {station: entry}
+machines: {}
+sensors:
+  eye.good: {passes: entry}
+  eye.bad:  {fails: entry}
+"""
+
+
+def both() -> tuple[Net, PlantModel]:
+    """Who finds a workpiece good and bad at once, of which one came behind the other."""
+    return parse_net(BOTH_NET), parse_plant(BOTH_PLANT)
+
+
 def judged() -> tuple[Net, PlantModel]:
     """A camera that finds a workpiece good which stays where a belt has carried it."""
     return parse_net(JUDGED_NET), parse_plant(JUDGED_PLANT)

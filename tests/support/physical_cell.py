@@ -10,7 +10,7 @@ Of the times of messages it is known that
   sent that see what its command does, and that of a stop when what it has broken off has been told;
 - they are short: while a machine is at a command there is a moment at which nothing is under way, unless nothing was as
   it was given it; a key that a command releases is told of before that is done;
-- a camera judges a workpiece when all is told that shows whether one lies there;
+- a camera judges a workpiece when all is told that shows whether one lies there, and what it was found;
 - so many messages are on a wire at most: a sensor that is taken a workpiece, given one and taken it again within one
   delay is in no loop, one that flickers is.
 """
@@ -77,8 +77,9 @@ class PhysicalCell(Plant):
         yield from super().done(place, state)
 
     def judges(self, station: str, state: State) -> Iterator[Changes]:
-        """A camera judges what is known to lie there, or not to."""
-        if not self.is_under_way({n for n, sensor in self.model.sensors.items() if sensor.occupied == station}, state):
+        """A camera judges what is known to lie there, or not to, and not to be judged yet."""
+        there = {name for name, sensor in self.model.sensors.items() if sensor.occupied == station}
+        if not self.is_under_way(there | {*self.judging(station)}, state):
             yield from super().judges(station, state)
 
     def _by_themselves(self) -> Iterator[tuple[str, Happens]]:
