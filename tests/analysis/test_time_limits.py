@@ -140,19 +140,26 @@ def test_a_robot_that_was_not_stopped_is_commanded_again_while_it_moves() -> Non
     assert any(fired[0] in named(FAULTS) for fired in verdict.witness.firings)
 
 
-def test_a_grip_is_tried_again_without_an_accident_where_the_stop_comes_with_the_timeout() -> None:
+def test_a_grip_that_is_tried_again_may_have_been_done_a_moment_before_the_timeout_and_its_stop() -> None:
     net = edited(
         ("until: touch,    description: grasping on CV1", "until: touch, within: 2s, description: grasping on CV1"),
         ("  t2-a:", "  t1-j: {from: robot.grasp_cv1_fault, to: robot.grasp_cv1, if: robot.reset}\n  t2-a:"),
         ("      to_mc:\n", "      grasp_cv1_fault: {send: {machine: R, command: STOP}}\n      to_mc:\n"),
     )
-    assert check_loop(net, catalogue_plant("one_robot_timed")).verdict("loop.accidents").holds
+    verdict = check_loop(net, catalogue_plant("one_robot_timed")).verdict("loop.accidents")
+    assert verdict.status is Status.VIOLATED
+    assert verdict.witness is not None
+    run = [name for (name,) in verdict.witness.firings]
+    done = next(i for i, name in enumerate(run) if name.startswith("R/done/robot.grasp_cv1/"))
+    assert run[done].endswith("/robot.touch-late")
+    assert any(name.startswith("robot.grasp_cv1_timeout") for name in run[done:])
+    assert run[-1].endswith("/R-holds")
 
 
 def test_a_timer_that_only_its_fault_transition_reads_is_no_place_of_the_loop() -> None:
     loop = close(timed(), catalogue_plant("one_robot_timed"))
     assert "robot.to_cv1_overdue" not in loop.net.place_index
-    assert "robot.at_cv1" in loop.net.transition("robot.to_cv1_timeout/R-idle").inhibitive
+    assert "plant.robot.at_cv1.told_1" in loop.net.transition("robot.to_cv1_timeout/R-idle").inhibitive
 
 
 def test_a_timer_that_something_else_reads_is_set_while_its_place_waits_and_cleared_by_the_next_command() -> None:
@@ -167,7 +174,7 @@ def test_a_timer_that_something_else_reads_is_set_while_its_place_waits_and_clea
     over = loop.net.transition("robot.to_cv1_overdue/over")
     assert over.outputs == ("robot.to_cv1_overdue",)
     assert "robot.to_cv1" in over.permissive
-    assert "robot.at_cv1" in over.inhibitive
+    assert "plant.robot.at_cv1.told_1" in over.inhibitive
     assert any("clears-robot.to_cv1_overdue" in name for name in loop.variants["G2"])
     report = check_loop(net, catalogue_plant("one_robot_timed"))
     assert report.verdict("loop.live").holds
