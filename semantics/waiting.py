@@ -44,7 +44,7 @@ def circle(net: Net, marking: Marking) -> tuple[Wait, ...]:
     waits = _Waits(net, marking)
     shortest: tuple[Wait, ...] = ()
     for p in list(bits(marking))[:_STARTS_MAX]:
-        for t in net.consumers[p]:
+        for t in waits.taking(p):
             found = waits.back_to((p, t))
             if found and (not shortest or len(found) < len(shortest)):
                 shortest = found
@@ -57,6 +57,15 @@ class _Waits:
     def __init__(self, net: Net, marking: Marking) -> None:
         self._net, self._marking = net, marking
         self._known: dict[_Node, tuple[tuple[_Node, Wait], ...]] = {}
+
+    def taking(self, p: int) -> Iterator[int]:
+        """Who takes the token of a place: not what can never fire, which nobody waits for."""
+        return (t for t in self._net.consumers[p] if self._may_fire(t))
+
+    def _may_fire(self, t: int) -> bool:
+        masks = self._net.masks[t]
+        contradicts = (masks.inputs | masks.permissive) & (masks.outputs | masks.inhibitive)
+        return not contradicts and self._net.transitions[t].openable
 
     def back_to(self, start: _Node) -> tuple[Wait, ...]:
         """The shortest way from a token that waits back to itself; empty where there is none."""
@@ -86,7 +95,7 @@ class _Waits:
         held, transition, masks = net.places[p].name, net.transitions[t], net.masks[t]
         for full in bits((masks.outputs | masks.inhibitive) & marking):
             name = net.places[full].name
-            for taking in net.consumers[full]:
+            for taking in self.taking(full):
                 yield (
                     (full, taking),
                     Wait(held, transition.name, name, wanted=False, holder=name, by=(net.transitions[taking].name,)),
@@ -118,7 +127,7 @@ class _Waits:
             found: list[_Holder] = []
             further: list[_Holder] = []
             for place, way in level:
-                for u in net.producers[place]:
+                for u in filter(self._may_fire, net.producers[place]):
                     for before in bits(net.masks[u].inputs):
                         if before in seen or (within is not None and net.places[before].owner != within):
                             continue

@@ -10,7 +10,7 @@ from support.lively_nets import lively_net
 
 from firable.analysis.spaces.reachability import explore
 from firable.nets.catalogue import catalogue_net
-from firable.nets.net import Marking, Net, Place, Transition
+from firable.nets.net import ExternalGate, Marking, Net, Place, Signal, Transition
 from firable.nets.verdict import Wait
 from firable.semantics.waiting import circle
 
@@ -34,6 +34,24 @@ def test_a_full_output_place_is_waited_for_too() -> None:
         Wait("a", "to_b", "b", wanted=False, holder="b", by=("to_a",)),
         Wait("b", "to_a", "a", wanted=False, holder="a", by=("to_b",)),
     )
+
+
+@pytest.mark.parametrize(
+    "never",
+    [
+        Transition("never", ("a",), ("a",)),
+        Transition("never", ("a",), ("b",), permissive=("b",)),
+        Transition("never", ("a", "b"), (), inhibitive=("a",)),
+        Transition("never", ("b",), ("a",), external=(ExternalGate("s"), ExternalGate("s", wanted=False))),
+    ],
+)
+def test_nobody_waits_for_what_can_never_fire(never: Transition) -> None:
+    ways = (Transition("to_b", ("a",), ("b", "c")), Transition("to_a", ("b",), ("a",)))
+    places = (Place("a", marked=True), Place("b", marked=True), Place("c"))
+    net = Net("swap", places, (never, *ways), signals=(Signal("s"),))
+    found = circle(net, net.initial_marking)
+    assert [wait.transition for wait in found] == ["to_b", "to_a"]
+    assert [wait.by for wait in found] == [("to_a",), ("to_b",)]
 
 
 def test_a_token_that_nothing_takes_waits_in_no_circle() -> None:
