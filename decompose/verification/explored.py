@@ -14,7 +14,7 @@ from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.formulas import spelled
 from firable.decompose.verification.recut import Cut
 from firable.decompose.verification.refusal import NotShownError
-from firable.decompose.verification.solvers import Answers, SolverError, gave_up
+from firable.decompose.verification.solvers import Answers, answers_to, gave_up
 from firable.decompose.verification.voting import Voting
 from firable.decompose.verification.voting_obligations import Obligations
 from firable.nets.verdict import NOTHING, Status, Verdict
@@ -104,13 +104,8 @@ def refuted(file: str, name: str, answer: str) -> NotShownError:
 def answered(examination: Examination, stated: Obligations, answers: Answers, timeout_ms: int) -> Found:
     """What the solver answers to the file of a family, which must be the one that is stated anew."""
     file = same_text(examination, stated)
-    try:
-        said = answers(stated.text, timeout_ms)
-    except SolverError as error:
-        raise NotShownError(f"the solver cannot read '{file}': {error}", "evidence", file) from None
-    if said[::2] != tuple(map(spelled, stated.names)) or len(said) % 2:
-        raise NotShownError(f"the solver does not answer one obligation of '{file}' after the other", "evidence", file)
-    unshown = [(name, answer) for name, answer in zip(stated.names, said[1::2], strict=True) if answer != "unsat"]
+    said = answers_to(file, stated.text, map(spelled, stated.names), answers, timeout_ms)
+    unshown = [(name, answer) for name, answer in zip(stated.names, said, strict=True) if answer != "unsat"]
     late = tuple(name for name, answer in unshown if gave_up(answer))
     return Found(late, tuple((name, answer) for name, answer in unshown if not gave_up(answer)))
 

@@ -17,7 +17,7 @@ from firable.decompose.verification.recut import Cut
 from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.restating import HEADS, Restated, Stated
 from firable.decompose.verification.restating_votes import UNIT
-from firable.decompose.verification.solvers import Answers, SolverError, gave_up
+from firable.decompose.verification.solvers import Answers, answers_to, gave_up
 from firable.nets.source import printable
 from firable.nets.verdict import Status, Verdict
 
@@ -101,14 +101,9 @@ def _answered(
 ) -> list[bool]:
     """Of each obligation whether it is shown; an answer that refutes one is refused."""
     name = _file(family)
-    try:
-        said = answers(examination.text(name), timeout_ms)
-    except SolverError as error:
-        raise NotShownError(f"the solver cannot read '{name}': {error}", "evidence", name) from None
-    if said[::2] != tuple(spelled(one.name) for one in stated) or len(said) % 2:
-        raise NotShownError(f"the solver does not answer one obligation of '{name}' after the other", "evidence", name)
-    found = []
-    for one, answer in zip(stated, said[1::2], strict=True):
+    found, names = [], [spelled(one.name) for one in stated]
+    said = answers_to(name, examination.text(name), names, answers, timeout_ms)
+    for one, answer in zip(stated, said, strict=True):
         if answer != "unsat" and not gave_up(answer):
             raise NotShownError(f"'{one.name}' is refuted: the solver says {answer}", "verdicts", one.name)
         found.append(answer == "unsat")

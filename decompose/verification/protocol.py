@@ -15,7 +15,7 @@ from typing import Final
 
 from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.refusal import NotShownError
-from firable.decompose.verification.solvers import Answers, SolverError, gave_up
+from firable.decompose.verification.solvers import Answers, answers_to, gave_up
 from firable.nets.verdict import NOTHING, Status, Verdict
 
 FILE: Final = "protocol.smt2"
@@ -39,13 +39,8 @@ def check_protocol(examination: Examination, solver: str, answers: Answers, time
     """Judge the verdicts on the protocol, after the net was cut anew; raises `NotShownError` where one is not shown."""
     if examination.text(FILE) != published():
         raise NotShownError(f"'{FILE}' is not the theorem on the protocol", "evidence", FILE)
-    try:
-        said = answers(published(), timeout_ms)
-    except SolverError as error:
-        raise NotShownError(f"the solver cannot read '{FILE}': {error}", "evidence", FILE) from None
-    if said[::2] != tuple(name for name, _ in blocks()) or len(said) % 2:
-        raise NotShownError(f"the solver does not answer one obligation of '{FILE}' after the other", "evidence", FILE)
-    for (name, sentence), answer in zip(blocks(), said[1::2], strict=True):
+    said = answers_to(FILE, published(), (name for name, _ in blocks()), answers, timeout_ms)
+    for (name, sentence), answer in zip(blocks(), said, strict=True):
         if answer != "unsat" and not gave_up(answer):
             raise NotShownError(f"'{name}' is refuted: the solver says {answer}", "verdicts", name)
         shown = answer == "unsat"

@@ -30,7 +30,7 @@ from firable.decompose.verification.naming_anew import Named
 from firable.decompose.verification.opening import Opening
 from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.relating import Relation
-from firable.decompose.verification.solvers import Answers, SolverError, gave_up
+from firable.decompose.verification.solvers import Answers, answers_to, gave_up
 from firable.decompose.verification.words import SENTENCES
 from firable.nets.bundle import file_stem
 from firable.nets.diagnostics import InputError
@@ -214,16 +214,9 @@ class _Records:
 
 def _answered(relation: Relation, answers: Answers, timeout_ms: int) -> set[str]:
     """The kinds of obligations of which the solver gave up one; an answer that refutes one is refused."""
-    try:
-        said = answers(relation.text, timeout_ms)
-    except SolverError as error:
-        raise NotShownError(f"the solver cannot read '{OBLIGATIONS}': {error}", "evidence", OBLIGATIONS) from None
-    names = [name for name, _ in relation.obligations]
-    if said[::2] != tuple(map(spelled, names)) or len(said) % 2:
-        message = f"the solver does not answer one obligation of '{OBLIGATIONS}' after the other"
-        raise NotShownError(message, "evidence", OBLIGATIONS)
-    open_ = set()
-    for name, answer in zip(names, said[1::2], strict=True):
+    open_, names = set(), [name for name, _ in relation.obligations]
+    said = answers_to(OBLIGATIONS, relation.text, map(spelled, names), answers, timeout_ms)
+    for name, answer in zip(names, said, strict=True):
         if answer != "unsat" and not gave_up(answer):
             message = f"'{name}' of '{OBLIGATIONS}' is refuted: the solver says {answer}"
             raise NotShownError(message, "evidence", OBLIGATIONS)

@@ -6,9 +6,11 @@ the file. Whoever has neither can take the files out (`firable verify BUNDLE --s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Final
+
+from firable.decompose.verification.refusal import NotShownError
 
 Answers = Callable[[str, int], tuple[str, ...]]
 """The lines that a solver prints for a text, without quotes, in so many milliseconds for each question."""
@@ -25,6 +27,20 @@ def gave_up(answer: str) -> bool:
     (True, False)
     """
     return answer == "timeout" or answer.startswith(("unknown", "interrupted by "))
+
+
+def answers_to(file: str, text: str, names: Iterable[str], answers: Answers, timeout_ms: int) -> tuple[str, ...]:
+    """What a solver answers to each obligation of a file of a bundle, which prints these names before it asks.
+
+    Raises `NotShownError` where it cannot read the file, or answers anything else than one question after the other.
+    """
+    try:
+        said = answers(text, timeout_ms)
+    except SolverError as error:
+        raise NotShownError(f"the solver cannot read '{file}': {error}", "evidence", file) from None
+    if said[::2] != tuple(names) or len(said) % 2:
+        raise NotShownError(f"the solver does not answer one obligation of '{file}' after the other", "evidence", file)
+    return said[1::2]
 
 
 def by_cvc5(text: str, timeout_ms: int) -> tuple[str, ...]:
