@@ -193,7 +193,8 @@ class Plant(Things):
                 waits = new[name] and is_behind
                 if name in late or waits:
                     next_.append({**way, news: True})
-                if (name not in late or late == {name} & {*self.completions}) and not waits and not is_known:
+                is_late_alone = late == {name} and name in self.completions
+                if (name not in late or is_late_alone) and not waits and not is_known:
                     next_.append({**way, told: new[name]})  # what is no news is known
             ways = next_
         yield from (changes | way for way in ways)
@@ -453,9 +454,7 @@ class Plant(Things):
         yield from ways
 
     def comes_to_be_shown(self, name: str, state: State) -> Iterator[Changes]:
-        """The sensor of a completion that is acknowledged shows it, when the others have been told."""
-        if any(state[f"news of {one}"] for one in self.told_before[name]):
-            return
+        """The sensor of a completion that is acknowledged shows it."""
         if state[f"acknowledged {name}"] and not state[f"signal {name}"] and self.seen(name, state):
             yield {f"acknowledged {name}": False, f"signal {name}": True}
 

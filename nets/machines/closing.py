@@ -47,7 +47,8 @@ from firable.nets.net import Controller, Net, Place, SignalKind, Transition
 from firable.nets.yaml_tree import Path
 
 VARIANTS_MAX: Final = 4096
-"""How many variants one transition may have; it doubles with each completion that it clears."""
+"""How many variants one transition may have before it is asked what controllers are told of it; it doubles with each
+completion that it clears."""
 
 
 def close(net: Net, model: PlantModel, faults: Faults = Faults.NONE, sending: Sending = Sending.AT_ONCE) -> ClosedLoop:
@@ -322,7 +323,7 @@ class _Closing:
             # A machine that has failed at a command still obeys a stop.
             may_hang = name in self.failed and not isinstance(self.laws.action(place), Stop)
             working = ((busy, True), (idle, False), *(((self.failed[name], False),) if may_hang else ()))
-            ends = Case(working, ((busy, False), (idle, True))).with_(self.telling.is_under_way(place))
+            ends = Case(working, ((busy, False), (idle, True))).with_(self.telling.may_end(place))
             at_work = each(calm, [ends])
             words = self.words(place)
             done = each(at_work, self.laws.done(place))
@@ -344,8 +345,7 @@ class _Closing:
             yield from self.named(f"{name}/repaired", f"{name} is repaired and goes on", each(calm, [repair]))
         for signal, waiting in self.acknowledged.items():
             shows = Case(((waiting, True), (signal, False), self.sensor(signal)), ((waiting, False), (signal, True)))
-            told = each(calm, [self.telling.is_told(*self.telling.behind.get(signal, ()))])
-            yield from self.named(f"{signal}/shown", f"the sensor of {signal} shows it", each(told, [shows]))
+            yield from self.named(f"{signal}/shown", f"the sensor of {signal} shows it", each(calm, [shows]))
         yield from self.sent_late(calm)
         for name, words, ways in self.telling.moves():
             yield from self.named(name, words, each(calm, ways))

@@ -190,9 +190,9 @@ class Telling:
         """The place that shows what the controller of a signal knows of it, and whether a token there means 1."""
         return (_told(signal), True) if signal in self.late else self.truth[signal]
 
-    def is_under_way(self, place: Place) -> Case:
-        """The machine that is at the command of a place is no longer starting. Nothing is news of its keys, which the
-        command has released, nor of what sees what a stop has broken off, where the machine says that it is at rest."""
+    def may_end(self, place: Place) -> Case:
+        """The command of a place may end: its machine is no longer starting; nothing is news of keys that it has
+        released, nor of what sees what a stop has broken off, where the machine says that it is at rest."""
         name, _ = self.laws.machine(place)
         before = {key for key, sensor in self.laws.model.sensors.items() if sensor.acknowledges == name}
         if isinstance(self.laws.action(place), Stop) and place.completion is not None:

@@ -12,6 +12,7 @@ from support.between_cells import (
     by_sensors,
     done,
     done_when_the_next_has_come,
+    formed,
     found_good,
     in_between,
     judged,
@@ -41,7 +42,13 @@ from firable.nets.net import Net
 from firable.nets.verdict import Status
 
 CELLS = ("one_robot", "one_robot_mc_late", "one_robot_timed", "two_robots_shared")
-KEYS = ("{set_by: operator}", "{acknowledges: B}", "{occupied: entry, may_flicker: true}", "{occupied: entry}")
+KEYS = {
+    "{set_by: operator}": "belt.key/set",
+    "{acknowledges: B}": "belt.key/pressed",
+    "{occupied: entry, may_flicker: true}": "arrives/entry",
+    "{occupied: entry}": "arrives/entry",
+}
+"""What the key is, and what makes it so."""
 
 
 def names(report: LoopReport, verdict: str) -> list[str]:
@@ -51,7 +58,9 @@ def names(report: LoopReport, verdict: str) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("cell", "between"), [*((in_between(key), "belt.key") for key in KEYS), (beside(), "W/done/belt.working")], ids=str
+    ("cell", "between"),
+    [*((in_between(key), how) for key, how in KEYS.items()), (beside(), "W/done/belt.working")],
+    ids=[*KEYS, "the end of another command"],
 )
 def test_all_that_can_happen_may_happen_while_a_controller_is_told_one_thing_after_the_other(
     cell: tuple[Net, PlantModel], between: str
@@ -60,7 +69,7 @@ def test_all_that_can_happen_may_happen_while_a_controller_is_told_one_thing_aft
     assert report.verdict("loop.accidents").status is Status.VIOLATED
     run = names(report, "loop.accidents")
     lies = next(i for i, name in enumerate(run) if name.startswith("B/done"))
-    assert any(name.startswith((between, "arrives/entry")) for name in run[lies:])
+    assert any(name.startswith(between) for name in run[lies:])
     for sending in Sending:
         assert compare(Plant(*cell, sending), close(*cell, sending=sending))
 
@@ -81,7 +90,7 @@ def test_what_a_time_limit_does_to_a_command_that_is_done_a_moment_before_is_fou
 
 def test_no_machine_is_done_with_what_it_was_told_to_do_in_between(monkeypatch: pytest.MonkeyPatch) -> None:
     assert check_loop(*by_sensors()).verdict("loop.property.never_odd").holds
-    for what, instead in (("is_under_way", lambda *_: Case()), ("sent", lambda *args: [args[1]])):
+    for what, instead in (("may_end", lambda *_: Case()), ("sent", lambda *args: [args[1]])):
         with monkeypatch.context() as patch:
             patch.setattr(Telling, what, instead)
             assert check_loop(*by_sensors()).verdict("loop.property.never_odd").status is Status.VIOLATED
@@ -92,7 +101,7 @@ def test_no_machine_is_done_with_what_it_was_told_to_do_in_between(monkeypatch: 
     [
         (done(), "behind", {}),
         (done_when_the_next_has_come(), "behind", {}),
-        (at_rest(), "is_under_way", lambda self, _: Case(((self.starting["R"], False),))),
+        (at_rest(), "may_end", lambda self, _: Case(((self.starting["R"], False),))),
         (judged(), "is_seen", lambda *_: Case()),
         (both(), "is_seen", lambda *_: Case()),
     ],
@@ -110,6 +119,10 @@ def test_a_time_may_be_over_while_a_controller_is_still_to_be_told_that_the_comm
     run = names(check_loop(*overdue()), "loop.property.never_odd")
     done_at = next(i for i, name in enumerate(run) if name.startswith("R/done/robot.grasp"))
     assert done_at < run.index("robot.grasp_overdue/over")
+
+
+def test_a_completion_is_formed_when_its_sensor_shows_it_whatever_else_is_still_to_be_told() -> None:
+    assert any("robot.gone" in one for one in reached(close(*formed()), 1_000) or ())
 
 
 def test_a_completion_that_no_sensor_is_told_before_is_not_too_late_for_ever() -> None:

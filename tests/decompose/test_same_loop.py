@@ -547,7 +547,7 @@ def test_signals_that_change_together_are_read_twice_too(extra: str, sending: Se
             lambda self, changes, _=(): frozenset(name for name, _ in changes if name not in self.completions),
         ),
         ("_with_news", lambda *args: iter([args[1]])),
-        ("is_under_way", lambda *_: Case()),
+        ("may_end", lambda *_: Case()),
         ("sent", lambda *args: [args[1]]),
         ("starting", {}),
         ("behind", {"belt.there": ()}),
@@ -566,7 +566,7 @@ def test_a_loop_that_tells_otherwise_is_refused(what: str, instead: object, monk
             compare(Plant(net, model, sending), loop)
 
 
-@pytest.mark.parametrize("what", ["is_told", "is_under_way"])
+@pytest.mark.parametrize("what", ["is_told", "may_end"])
 def test_a_loop_that_waits_for_no_key_is_refused(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A key is told of before it changes again, and before the command is done that has released it."""
     net, model = catalogue_net("one_robot_timed"), catalogue_plant("one_robot_timed")

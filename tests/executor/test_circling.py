@@ -91,6 +91,7 @@ def with_lamp(limit: str) -> str:
 def test_a_motion_that_is_late_each_time_and_tried_again_ends_the_run() -> None:
     report = ran(NET)
     assert (report.state, report.delivered, report.inside) == (State.FAULT, (), (1,))
+    # When the circle began depends on whether a workpiece that is due as a time is over comes before that or after it.
     assert report.situation.message == (
         "the cell goes round in a circle of again and robot.out_timeout: 200 firings in 397 s led to nothing new, and "
         "brought no workpiece any further"

@@ -1,4 +1,4 @@
-"""What cells do whose signals are messages on wires is what their loops do, and no loop does anything else."""
+"""What cells do whose signals are messages on wires is in their loops; of small cells, no loop does anything else."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 from support import inspected_cell, rejecting_cell
-from support.between_cells import beside, blind, both, bouncing, by_sensors, in_between, leaving, twice
+from support.between_cells import beside, blind, both, bouncing, by_sensors, formed, in_between, leaving, twice
 from support.drawn_cells import drawn_cell
 from support.examples import seeds
 from support.physical_cell import PhysicalCell, reached
@@ -24,7 +24,7 @@ from firable.nets.net import Net
 from firable.nets.text import parse_net
 
 CELLS: dict[str, Callable[[], tuple[Net, PlantModel]]] = {
-    **{one.__name__: one for one in (beside, blind, both, bouncing, by_sensors, leaving, twice)},
+    **{one.__name__: one for one in (beside, blind, both, bouncing, by_sensors, formed, leaving, twice)},
     **{one.__name__: one for one in (carried, stopped, together, belts)},
     "pressed": lambda: in_between("{acknowledges: B}"),
     "flickering": lambda: in_between("{occupied: entry, may_flicker: true}"),
@@ -67,7 +67,7 @@ def test_a_cell_with_wires_does_what_its_loop_does(
 
 @pytest.mark.seeds
 @pytest.mark.parametrize("seed", seeds(6))
-def test_what_a_drawn_cell_with_wires_does_is_what_its_loop_does(seed: int) -> None:
+def test_what_a_drawn_cell_with_wires_does_is_in_its_loop(seed: int) -> None:
     cell = drawn_cell(seed)
     for sending in Sending:
         if (markings := reached(close(cell.net, cell.plant, sending=sending), 20_000)) is not None:
@@ -83,7 +83,7 @@ def test_what_a_drawn_cell_with_wires_does_is_what_its_loop_does(seed: int) -> N
         (Telling, "moves", lambda _: iter(()), "carried"),
         (Telling, "behind", {}, "beside"),
         (Telling, "is_told", lambda *_: Case(), "pressed"),
-        (Telling, "is_under_way", lambda *_: Case(), "by_sensors"),
+        (Telling, "may_end", lambda *_: Case(), "by_sensors"),
         (Telling, "sent", lambda *args: [args[1]], "by_sensors"),
     ],
 )

@@ -10,6 +10,7 @@ from support.lively_nets import lively_net
 
 from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.machines import excluding
+from firable.nets.machines.closing import close
 from firable.nets.machines.excluding import Excluding, with_one_token
 from firable.nets.machines.laws import Laws
 from firable.nets.machines.plant_file import parse_plant
@@ -129,6 +130,7 @@ def test_who_reads_the_place_and_waits_for_no_completion_is_not_excluded() -> No
     assert not excluded(found, "press.door", value=False)
 
 
-def test_every_sensor_of_the_untimed_cell_of_the_catalogue_is_told_in_the_instant() -> None:
+def test_every_command_of_the_untimed_cell_of_the_catalogue_is_announced_and_nothing_told_late() -> None:
     laws = Laws(catalogue_plant("one_robot"), net := catalogue_net("one_robot"))
     assert Excluding(laws).announced == {p.name for p in net.places if p.completion is not None}
+    assert close(net, catalogue_plant("one_robot")).news == {}

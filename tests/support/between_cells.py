@@ -431,8 +431,6 @@ controllers:
 transitions:
   go:  {from: belt.rest, to: [belt.run, belt.halt], if: belt.entry}
   see: {from: belt.calm, to: belt.seen, if: belt.entry}
-properties:
-  never_run: {never: belt.run}
 """
 TWICE_PLANT = """firable_plant: 1
 plant: twice
@@ -525,3 +523,51 @@ sensors:
 def leaving() -> tuple[Net, PlantModel]:
     """A workpiece leaves, and the next one is laid down, before a controller is told of the one or the other."""
     return parse_net(LEAVING_NET), parse_plant(LEAVING_PLANT)
+
+
+FORMED_NET = """firable: 1
+cell: shown
+controllers:
+  robot:
+    start: [free, ready, w0]
+    inputs: [in, entry, holds]
+    places:
+      free:
+      grasp: {send: {machine: R, command: GRASP, at: ENTRY}, until: seen}
+      gone:
+      ready:
+      first: {send: {machine: A, command: RUN}, until: brought}
+      second: {send: {machine: A, command: RUN}}
+      w0:
+      w1:
+      w2:
+      w3:
+transitions:
+  feed: {from: robot.ready, to: robot.first, if: robot.in}
+  more: {from: robot.first, to: robot.second, if: robot.in}
+  come: {from: robot.free, to: robot.grasp, if: [robot.entry, robot.second]}
+  o1:   {from: robot.w0, to: robot.w1, if: robot.grasp, unless: [robot.entry, robot.holds]}
+  o2:   {from: robot.w1, to: robot.w2, if: robot.entry, unless: robot.holds}
+  o3:   {from: robot.w2, to: robot.w3, unless: [robot.entry, robot.holds]}
+  end:  {from: [robot.grasp, robot.w3], to: robot.gone}
+"""
+FORMED_PLANT = """firable_plant: 1
+plant: shown
+stations: [in, entry]
+arrivals:   {station: in, every_s: 5}
+departures: {station: entry, raw: true}
+machines:
+  R: {hand: ENTRY, positions: {ENTRY: entry}, commands: {GRASP: {does: grasp, takes_s: 1}}}
+  A: {commands: {RUN: {does: carry, from: in, to: entry, takes_s: 1, when_full: wait}}}
+sensors:
+  robot.in:     {occupied: in}
+  robot.entry:  {occupied: entry}
+  robot.holds:  {holding: R}
+  robot.seen:   {occupied: entry}
+"""
+
+
+def formed() -> tuple[Net, PlantModel]:
+    """A completion that its sensor forms while another one that sees the grip is still to be told of, and that goes on
+    when the workpiece has gone again."""
+    return parse_net(FORMED_NET), parse_plant(FORMED_PLANT)
