@@ -1,9 +1,8 @@
 """The obligations hold for every split, are refuted for every edited one, and other solvers agree."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from itertools import combinations, product
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -14,25 +13,15 @@ from support.examples import examples, some
 from support.reference import load_net
 from support.second_solver import by_cvc5
 
-from firable.analysis.check import check
-from firable.analysis.evidence.document import Document
-from firable.analysis.evidence.producing.lacking import NO_MARKINGS, NO_MEMORY, NO_TIME
-from firable.analysis.evidence.producing.producer import evidence_of_report
-from firable.analysis.goal import Limits
 from firable.analysis.induction.smt import Answer, Decision, Operator, Terms, value
-from firable.analysis.report import CheckReport
-from firable.cli.main import main
-from firable.decompose.bundling import make_bundle
 from firable.decompose.proofs.arbitration import Competition, Steps, arbitration, choice
-from firable.decompose.proofs.families import FAMILIES
 from firable.decompose.proofs.family import Task
 from firable.decompose.proofs.proving import ProofReport, prove
 from firable.decompose.proofs.script import Reader, ScriptError, block
-from firable.decompose.proofs.standing import ASSUMED_BY_THE_PROTOCOL, standing
+from firable.decompose.proofs.standing import ASSUMED_BY_THE_PROTOCOL
 from firable.decompose.protocol.parametric.side_conditions import side_conditions
 from firable.decompose.splitting.cut import split
-from firable.nets.bundle import Bundle
-from firable.nets.catalogue import catalogue_names, catalogue_net, family_net
+from firable.nets.catalogue import catalogue_net, family_net
 from firable.nets.decomposition import Decomposition, Part
 from firable.nets.diagnostics import InputError
 from firable.nets.net import (
@@ -47,11 +36,9 @@ from firable.nets.net import (
     SignalKind,
     Transition,
 )
-from firable.nets.queries import Query
-from firable.nets.right_to_run import CHECKED, required_verdicts, unproved
+from firable.nets.right_to_run import CHECKED, required_verdicts
 from firable.nets.verdict import Status, Verdict, Weight
 from firable.semantics.arbitration import Arbitration
-from firable.semantics.trace import Discipline
 
 SPLITTABLE = [
     *("cell1", "cell1_mc_late", "cell1_mc_late_cap", "cell2_separate", "cell2_shared", "fig4_parallel"),
@@ -392,7 +379,7 @@ def _once(patched: pytest.MonkeyPatch, read: Any, first: Any, context: object, t
 
 
 # --------------------------------------------------------------------------------------------------------------------
-# Arbitration, and the bundle
+# Arbitration
 
 
 @given(st.data())
@@ -479,124 +466,3 @@ def test_arbiter_over_many_is_proved_at_a_size_linear_in_its_arcs(by: Arbitratio
         assert report.holds
         sizes.append(len(report.files["arbitration.smt2"]))
     assert sizes[1] < 2.2 * sizes[0]
-
-
-def test_cell_is_bundled_with_all_its_proofs() -> None:
-    report = check(catalogue_net("one_robot"))
-    bundle = make_bundle(report)
-    assert unproved(bundle) == ()
-    assert bundle.net == report.net
-    assert Bundle.from_bytes(bundle.to_bytes()) == bundle
-
-
-@pytest.mark.parametrize("name", catalogue_names())
-def test_check_and_prove_give_exactly_the_required_verdicts_each_once(name: str) -> None:
-    net = catalogue_net(name)
-    decomposition = split(net)
-    verdicts = (*check(net).verdicts, *prove(decomposition).verdicts)
-    assert {v.name for v in verdicts if v.weight is Weight.REQUIRED} == {*required_verdicts(decomposition)}
-    assert len({verdict.name for verdict in verdicts}) == len(verdicts)
-
-
-def not_bundled(report: CheckReport) -> str:
-    with pytest.raises(InputError) as refusal:
-        make_bundle(report)
-    assert {diagnostic.code for diagnostic in refusal.value.diagnostics} == {"F4003"}
-    return str(refusal.value)
-
-
-def test_net_with_anything_unproved_is_not_bundled() -> None:
-    report = check(load_net("ring"))
-    doubted = tuple(replace(verdict, status=Status.UNKNOWN) for verdict in report.verdicts)
-    for verdicts in ((), report.verdicts[:1], doubted):
-        not_bundled(replace(report, verdicts=verdicts))
-    lost = tuple(replace(verdict, evidence=("lost.smt2",)) for verdict in report.verdicts)
-    bundle = make_bundle(replace(report, verdicts=lost))  # what was found elsewhere is none of its evidence
-    assert {file for verdict in bundle.verdicts for file in verdict.evidence} == set(bundle.evidence)
-
-
-def protocol_lines(decomposition: Decomposition, verdicts: Iterable[Verdict]) -> list[tuple[str, str]]:
-    return [(one.status, one.by) for one in standing(decomposition, verdicts) if one.name in {"O1", "O5"}]
-
-
-def test_protocol_proof_says_of_a_split_what_it_says_where_all_that_it_assumes_is_proved() -> None:
-    decomposition = split(catalogue_net("conceptual_one_robot"))
-    verdicts = prove(decomposition).verdicts
-    assert protocol_lines(decomposition, verdicts) == [("by the protocol proof", "protocol")] * 2
-    for family in ASSUMED_BY_THE_PROTOCOL:
-        (title,) = (one.title for one in FAMILIES if one.name == family)
-        one = next(v for v in verdicts if v.name.partition(".")[0] == family)
-        others = tuple(v for v in verdicts if v != one)
-        for told in (others, *((*others, replace(one, status=s)) for s in (Status.UNKNOWN, Status.VIOLATED))):
-            assert (
-                protocol_lines(decomposition, told)
-                == [("unknown", f"protocol, which assumes of the split what is not proved here: {title}")] * 2
-            )
-    side = side_conditions(replace(decomposition, subnets=decomposition.subnets[1:]))
-    assert not all(verdict.holds for verdict in side)
-    doubted = "protocol, which assumes of the split what is not proved here: side conditions"
-    assert protocol_lines(decomposition, (*verdicts, *side)) == [("unknown", doubted)] * 2
-    o2 = tuple(v for v in verdicts if not v.name.startswith("o2."))
-    assert protocol_lines(decomposition, o2) == [("by the protocol proof", "protocol")] * 2
-    (owned,) = (v for v in verdicts if v.name == "ownership")
-    doubted = "protocol, which assumes of the split what is not proved here: ownership"
-    twice = (*verdicts, replace(owned, status=Status.VIOLATED))
-    assert protocol_lines(decomposition, twice) == [("unknown", doubted)] * 2, "proved and violated is not proved"
-    broken = (replace(v, status=Status.VIOLATED) if v.name.startswith("protocol.") else v for v in verdicts)
-    assert protocol_lines(decomposition, [v for v in broken if v is not owned]) == [("violated", doubted)] * 2
-
-
-@pytest.mark.parametrize(
-    ("of_one", "says"),
-    [(Status.PROVED, "shown in the loop"), (Status.UNKNOWN, "unknown"), (Status.VIOLATED, "violated")],
-)
-def test_gates_stay_open_where_the_machines_show_it_of_each(of_one: Status, says: str) -> None:
-    decomposition = split(catalogue_net("one_robot"))
-    verdicts = [Verdict(f"o4.{name}", Status.PROVED, "it stays open", "the loop") for name in ("one", "two", "three")]
-    verdicts[1] = replace(verdicts[1], status=of_one)
-    (line,) = (one for one in standing(decomposition, verdicts) if one.name == "O4")
-    assert (line.status, line.by) == (says, "with the machines that were given")
-
-
-@pytest.mark.parametrize(
-    ("why", "code", "hint"),
-    [
-        ("nothing shows it", "F4003", "allow more time to look for evidence, with --max-seconds"),
-        (NO_TIME, "F3004", "allow more time to look for evidence, with --max-seconds"),
-        (NO_MEMORY, "F3004", "allow more memory, with --max-memory"),
-        (NO_MARKINGS, "F4003", "that is a limit of size, which no time moves"),
-        ("ranks are written for up to 250,000 markings", "F4003", "that is a limit of size, which no time moves"),
-    ],
-)
-def test_net_is_not_bundled_where_no_evidence_on_it_was_found(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, why: str, code: str, hint: str
-) -> None:
-    def without(report: CheckReport, queries: Sequence[Query], limits: Limits) -> Document:
-        document = evidence_of_report(report, queries, limits)
-        lacking = {"deadlock-free", "live"}  # of which the one is required
-        records = (replace(r, shown=(), lacking=why) if r.name in lacking else r for r in document.records)
-        return replace(document, records=tuple(records))
-
-    monkeypatch.setattr("firable.decompose.bundling.evidence_of_report", without)
-    with pytest.raises(InputError) as refusal:
-        make_bundle(check(catalogue_net("one_robot")))
-    (one,) = refusal.value.diagnostics
-    assert (one.code, one.subject) == (code, ("verdicts", "deadlock-free"))
-    assert one.message == f"'deadlock-free' is proved, and there is no evidence that shows it again: {why}"
-    assert one.hint.startswith(hint)
-    made = tmp_path / "cell.bundle"
-    assert main(["bundle", "catalogue:one_robot", "-o", str(made)]) == (3 if code == "F3004" else 2)
-    assert not made.exists()
-
-
-def test_deadlocking_net_is_not_bundled_with_the_verdicts_on_a_good_one() -> None:
-    good, late = check(catalogue_net("one_robot")), check(catalogue_net("one_robot_mc_late"))
-    assert "'deadlock-free' is violated" in not_bundled(late)
-    assert "another net" in not_bundled(replace(good, net=late.net))
-
-
-def test_verdicts_on_steps_are_no_reason_to_run() -> None:
-    net = load_net("ring")
-    for discipline in (Discipline.INTERLEAVING, Discipline.STEP):
-        assert "interleaving" in not_bundled(replace(check(net, Discipline.STEP), discipline=discipline))
-    assert make_bundle(check(net)).net == net

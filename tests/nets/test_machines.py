@@ -1,28 +1,20 @@
-"""The loop of a cell with its machines: its transitions, its laws against the simulated cell, and its refusals."""
+"""The loop of a cell with its machines: its transitions, workpieces that are judged, and its refusals."""
 
 from __future__ import annotations
 
-import random
-from collections.abc import Iterator
-from copy import deepcopy
 from pathlib import Path
 
 import pytest
 from support import inspected_cell, together_cell
-from support.bench_cell import COMMANDS, JUDGED, LEAVING, LEAVING_RAW, bench, free_cell
-from support.examples import seeds
+from support.bench_cell import JUDGED, bench, free_cell
 
 from firable.analysis.loop.verdicts import check_loop
-from firable.executor.cell.plant import Plant, PlantFault, PlantReport
-from firable.executor.cell.plant import _Busy as Busy
-from firable.executor.cell.plant import _Finish as Finish
 from firable.nets.catalogue import catalogue_names, catalogue_net, catalogue_path, catalogue_plant
 from firable.nets.diagnostics import InputError
 from firable.nets.machines.closing import close
-from firable.nets.machines.laws import Laws
-from firable.nets.machines.loop import ACCIDENT, OVERRUN, ClosedLoop, Faults, Sending
+from firable.nets.machines.loop import ClosedLoop, Faults, Sending
 from firable.nets.machines.moment import NOTHING, Case, each
-from firable.nets.machines.plant_file import PlantModel, parse_plant
+from firable.nets.machines.plant_file import parse_plant
 from firable.nets.net import Command, Controller, Net, Place, Signal, SignalKind, Transition
 from firable.nets.printing import format_net
 from firable.nets.text import parse_net
@@ -400,196 +392,6 @@ def test_a_judgement_never_makes_a_loop_restless() -> None:
         if {*t.inputs, *t.outputs} <= verdicts and (t.inputs or t.outputs):
             assert "/judged/" in t.name
             assert not t.inputs, "it happens once for a workpiece that lies there"
-
-
-# --- The laws are those of the simulated cell
-
-
-class AlwaysInTime(random.Random):
-    """What a machine breaks off it is always so near the end of that it may still do it."""
-
-    def random(self) -> float:
-        return 0.0
-
-
-class Told(Plant):
-    """A plant whose cameras find workpieces what they are told to, and when."""
-
-    def _find(self, station: str) -> None:
-        """Nothing yet."""
-
-
-class Twin:
-    """A loop and a simulated plant that are led through the same events."""
-
-    def __init__(self, net: Net, model: PlantModel) -> None:
-        self.net, self.loop = net, close(net, model)
-        self.player, self.marking = Player(self.loop.net), self.loop.net.initial_marking
-        self.own = {variant: name for name, some in self.loop.variants.items() for variant in some}
-        self.plant = Told(model, workpieces=10_000)
-        self.plant.random = AlwaysInTime()
-        self.judged = sorted(Laws(model, net).judged)
-        named = [signal.name for signal in net.signals]
-        self.late = [name for name in named if f"plant.{name}.news" in self.loop.net.place_index]
-
-    def holds(self, place: str) -> bool:
-        return bool(self.marking >> self.loop.net.place_index[place] & 1)
-
-    def fire(self, t: int) -> None:
-        name = self.loop.net.transitions[t].name
-        self.marking = self.player.fire(self.marking, [t])
-        reports = self.simulate(name)
-        faults = [report for report in reports if isinstance(report, PlantFault)]
-        assert bool(faults) == (name in self.loop.accidents), (name, reports)
-        assert bool(faults) == (self.holds(ACCIDENT) or self.holds(OVERRUN))
-        if not faults:
-            self.compare()
-
-    def simulate(self, name: str) -> list[PlantReport]:
-        if name in self.own:
-            reports: list[PlantReport] = []
-            for entered in self.net.transition(self.own[name]).outputs:
-                if (command := self.net.place(entered).command) is not None:
-                    self.plant.now_seconds += 1
-                    parameters = dict(command.parameters)
-                    ticket = self.net.place_index[entered]
-                    reports += self.plant.command(
-                        self.plant.now_seconds, command.machine, command.command, parameters, ticket
-                    )
-            return reports
-        what, _, of = name.partition("/")
-        if what == "arrives":
-            self.plant.arrival_due = True
-            self.plant._arrive()
-            return []
-        if what == "leaves":
-            return self.plant._lawful("", self.departing(of.partition("/")[0]))
-        if of.startswith("judged/"):
-            self.plant.found_good[what] = of == "judged/passes"
-            return []
-        if of.partition("/")[0] in {"shown", "told", "started", "clears", "drops", "returns"}:
-            return []
-        machine = self.plant.machines[what]
-        busy = machine.breaks_off if of.startswith("still-") else machine.busy
-        assert isinstance(busy, Busy)
-        return self.plant._lawful(what, self.plant._happen(Finish(what, busy)))
-
-    def departing(self, station: str) -> Iterator[PlantReport]:
-        leaving = self.plant.stations[station]
-        assert leaving is not None
-        self.plant._depart(station, leaving.id)
-        yield from ()
-
-    def compare(self) -> None:
-        self.compare_places()
-        firable = [self.loop.net.transitions[t].name for t in self.player.firable(self.marking)]
-        for name, machine in self.plant.machines.items():
-            ends = any(move.startswith((f"{name}/done/", f"{name}/accident/")) for move in firable)
-            if machine.busy is None or self.is_kept(name, machine.busy):
-                assert not ends
-                continue
-            later = deepcopy(self.plant)
-            busy = later.machines[name].busy
-            assert busy is not None
-            later._lawful(name, later._happen(Finish(name, busy)))
-            waits = later.machines[name].busy
-            assert ends == (waits is None or not waits.waits), f"{name} at {busy.command}"
-
-    def is_kept(self, name: str, busy: Busy) -> bool:
-        """Whether a machine gets done later, because a controller is still to be told something: of before it was given
-        its command, or of what it has broken off, where somebody waits until it is at rest."""
-        starting = f"plant.{name}.starting"
-        if starting in self.loop.net.place_index and self.holds(starting):
-            return True
-        shown = {"c.entry", "c.fresh", "c.ok", "c.nok"} & {*self.late}
-        at_rest = self.net.places[busy.ticket].completion == "c.at_rest"
-        return at_rest and any(self.holds(f"plant.{signal}.news") for signal in shown)
-
-    def compare_places(self) -> None:
-        for station, workpiece in self.plant.stations.items():
-            assert self.holds(f"plant.{station}.empty") == (workpiece is None)
-            if workpiece is not None:
-                assert self.holds(f"plant.{station}.{'machined' if workpiece.processed else 'raw'}")
-        for name, machine in self.plant.machines.items():
-            assert self.holds(f"plant.{name}.idle") == (machine.busy is None), name
-            if machine.busy is not None:
-                entered = self.net.places[machine.busy.ticket].name
-                assert self.holds(self.loop.at[entered])
-            broken_off = self.net.places[machine.breaks_off.ticket].name if machine.breaks_off is not None else ""
-            for place in self.net.places:
-                fact = f"plant.{name}.breaks_off.{place.name}"
-                # The simulated cell remembers what it broke off also when that is done after all.
-                assert fact not in self.loop.net.place_index or not self.holds(fact) or place.name == broken_off
-            if machine.position is not None:
-                assert self.holds(f"plant.{name}.hand_at.{machine.position}")
-        for station in self.judged:
-            found = self.plant.found_good.get(station)
-            shown = {good: self.holds(f"plant.{station}.{word}") for good, word in ((True, "passes"), (False, "fails"))}
-            assert shown == {True: found is True, False: found is False}
-        for name, sensor in self.plant.model.sensors.items():
-            shows, means = self.loop.shown[name]
-            is_completion = self.net.signal(name).kind is SignalKind.COMPLETION  # set when its sensor agrees
-            is_exact = not (is_completion or sensor.may_flicker or sensor.may_linger)
-            is_news = name in self.late and self.holds(f"plant.{name}.news")
-            # What has changed twice since is as its controller was told, and news all the same.
-            assert not is_exact or is_news or (self.holds(shows) == means) == self.plant._sees(name, sensor)
-        for station in ("table",):
-            assert self.holds(f"plant.{station}.clamped") == (station in self.plant.clamped)
-
-
-@pytest.mark.seeds
-@pytest.mark.parametrize("seed", seeds(20))
-@pytest.mark.parametrize("judged", ["", JUDGED], ids=["", "judged"])
-@pytest.mark.parametrize("leaving", [LEAVING, LEAVING_RAW], ids=["", "two ways out"])
-def test_the_loop_and_the_simulated_cell_obey_the_same_laws(seed: int, judged: str, leaving: str) -> None:
-    draw = random.Random(seed)
-    twin = Twin(free_cell(judged=bool(judged)), bench(judged=judged, leaving=leaving))
-    for _ in range(60):
-        choices = twin.player.firable(twin.marking)
-        # Accidents end a walk, so they are left for the end, where one is seen to happen in both.
-        calm = [t for t in choices if twin.loop.net.transitions[t].name not in twin.loop.accidents]
-        wild = [t for t in choices if t not in calm]
-        if not calm or (wild and draw.random() < 0.08):
-            break
-        twin.fire(draw.choice(calm))
-    wild = [t for t in twin.player.firable(twin.marking) if twin.loop.net.transitions[t].name in twin.loop.accidents]
-    for t in wild[:1]:
-        twin.fire(t)
-
-
-@pytest.mark.seeds
-@pytest.mark.parametrize("seed", seeds(25))
-def test_a_variant_is_firable_iff_its_transition_is_and_its_gates_are_open(seed: int) -> None:
-    draw = random.Random(seed)
-    chosen = tuple(draw.sample(list(COMMANDS), 6))
-    judged = draw.choice(["", JUDGED])
-    net = free_cell(chosen, judged=bool(judged))
-    loop = close(net, bench(draw.choice(["", ", may_flicker: true", ", may_linger: true"]), judged))
-    player, open_player = Player(loop.net), Player(net)
-    marking, mask = loop.net.initial_marking, (1 << len(net.places)) - 1
-
-    def shows(signal: str) -> bool:
-        place, means = loop.shown[signal]
-        return bool(marking >> loop.net.place_index[place] & 1) == means
-
-    for _ in range(40):
-        firable = {loop.net.transitions[t].name for t in player.firable(marking)}
-        ended = marking & loop.net.marking([ACCIDENT, OVERRUN])
-        for t, transition in enumerate(net.transitions):
-            is_open = all(shows(gate.signal) == gate.wanted for gate in transition.external)
-            expected = is_open and t in open_player.firable(marking & mask) and not ended
-            possible = [name for name in loop.variants[transition.name] if name in firable]
-            assert len(possible) == int(expected), (transition.name, possible)
-        if not firable:
-            break
-        t = draw.choice(player.firable(marking))
-        after = player.fire(marking, [t])
-        own = next((name for name, some in loop.variants.items() if loop.net.transitions[t].name in some), None)
-        projected = marking & mask
-        if own is not None:
-            projected = open_player.fire(projected, [net.transition_index[own]])
-        assert after & mask == projected, "a run of the loop is one of the open net"
-        marking = after
 
 
 def test_every_completion_and_sensor_of_the_catalogue_is_shown_by_something() -> None:

@@ -1,11 +1,16 @@
-"""Documents, answers of the second solver and findings of the checker that many mutants share, found once a process."""
+"""Bundles, documents, answers of the second solver and what the checker finds, once a process for many mutants."""
 
 from collections.abc import Iterator
 from functools import cache, lru_cache
 
+from firable.analysis.check import check
 from firable.analysis.evidence.checking.checker import CheckedRecord, check_document
 from firable.analysis.evidence.document import Document, document_from_text
+from firable.decompose.bundling import make_bundle
 from firable.decompose.verification.solvers import by_cvc5
+from firable.nets.bundle import Bundle
+from firable.nets.catalogue import catalogue_net, family_net
+from firable.nets.verdict import Verdict
 
 _found: dict[tuple[str, int], tuple[CheckedRecord, ...]] = {}
 
@@ -28,3 +33,14 @@ def examined(document: Document, timeout_ms: int) -> Iterator[CheckedRecord]:
     if key not in _found:
         _found[key] = tuple(check_document(document, timeout_ms=timeout_ms))
     return iter(_found[key])
+
+
+@cache
+def bundled(name: str) -> Bundle:
+    """A bundle of a cell of the catalogue, or of a member of a family."""
+    return make_bundle(check(family_net(name) if "-" in name else catalogue_net(name)))
+
+
+def rests_on_an_obligation(verdict: Verdict) -> bool:
+    """Whether a verdict of a bundle names a file of obligations as its evidence."""
+    return verdict.evidence[:1] != () and verdict.evidence[0].endswith(".smt2")
