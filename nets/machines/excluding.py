@@ -77,12 +77,12 @@ class Excluding:
         net = self.laws.net
         found = set[str]()
         for place in self.laws.commanding:
-            those = [other for other in net.places if other.completion == place.completion]
+            if place.completion is None:
+                continue
+            those = (other for other in net.places if other.completion == place.completion)
             machines = {other.command and other.command.machine for other in those}
             takers = (t for t in net.transitions if place.name in t.inputs)
-            if place.completion is None or len(machines) > 1:
-                continue
-            if all(ExternalGate(place.completion) in t.external for t in takers):
+            if len(machines) == 1 and all(ExternalGate(place.completion) in t.external for t in takers):
                 found.add(place.name)
         return frozenset(found)
 

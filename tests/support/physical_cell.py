@@ -86,19 +86,10 @@ class PhysicalCell(Plant):
         yield from super()._by_themselves()
         yield from ((f"{name} arrives", partial(self.message_arrives, name)) for name in self.truths)
 
-    @cached_property
-    def behind(self) -> dict[str, set[str]]:
-        """For each completion what sees what its commands do."""
-        found = {name: set[str]() for name in self.completions}
-        for place in self.commanding:
-            if place.completion is not None:
-                found[place.completion] |= {name for name, _ in self.shows_done(place)}
-        return found
-
     def message_arrives(self, name: str, state: State) -> Iterator[Changes]:
         """The oldest message of a signal."""
         wire = str(state[f"wire {name}"])
-        if wire and not (name in self.completions and self.is_under_way(self.behind[name], state)):
+        if wire and not (name in self.completions and self.is_under_way(self.seen_with[name], state)):
             yield {f"wire {name}": wire[1:], f"arrived {name}": wire[0] == "1"}
 
     def is_news(self, happens: Happens, places: list[Place], state: State) -> Iterator[Changes]:
