@@ -78,7 +78,11 @@ def explore(
 
 @final
 class Graph:
-    """A reachability graph. Markings are stored, edges are computed again when they are asked for."""
+    """A reachability graph. Markings are stored, edges are computed again when they are asked for.
+
+    From the second question on that goes against them (`backward`) edges are kept, turned round, where
+    `max_memory_bytes` has room for them.
+    """
 
     @property
     def complete(self) -> bool:
@@ -103,10 +107,10 @@ class Graph:
         """How many 64-bit words a marking takes."""
     @property
     def memory_bytes(self) -> int:
-        """Bytes held by the graph: markings, hash table, statistics and the compiled net."""
+        """Bytes held by the graph: markings, hash table, statistics, the compiled net, and edges once they are kept."""
     @property
     def bytes_per_marking(self) -> float:
-        """`memory_bytes` by `n_markings`."""
+        """Bytes held when the exploration had ended, by `n_markings`."""
     @property
     def seconds(self) -> float:
         """How long the exploration took."""
@@ -200,6 +204,20 @@ class Graph:
         cancelled: Callable[[], bool] | None = None,
     ) -> Components:
         """The strongly connected components of the graph, or of the part within a set. Needs the whole graph."""
+    def fair(
+        self,
+        within: list[int] | bytes,
+        fairness: str,
+        *,
+        max_seconds: float | None = None,
+        cancelled: Callable[[], bool] | None = None,
+    ) -> bytes:
+        """For each marking ("<u4") the number of the component in which a fair run can go on for ever inside a set, or
+        2**32 - 1; `fairness` is "none", "weak" or "strong". Needs the whole graph.
+
+        Cost: that of components, and a look at each marking in one that is not a single marking; under strong fairness
+        as often as markings are taken out.
+        """
     def edges(
         self, *, max_seconds: float | None = None, cancelled: Callable[[], bool] | None = None
     ) -> tuple[bytes, bytes]:

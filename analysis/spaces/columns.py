@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Any, Final
 
 import numpy as np
@@ -97,14 +97,32 @@ def masks(rows: npt.NDArray[np.uint64]) -> list[int]:
     return [int.from_bytes(data[begin : begin + size], "little") for begin in range(0, len(data), size)]
 
 
-def reader(rows: npt.NDArray[np.uint64]) -> Callable[[int], Any]:
-    """What reads a place in each of some markings, packed."""
+PART: Final = 1 << 16
+"""So many markings make a part, on which terms are evaluated together."""
 
-    @cache
-    def holds(place: int) -> Any:
-        return packed((rows[:, place // 64] & np.uint64(1 << place % 64)) != 0)
 
-    return holds
+class Places:
+    """Which markings of a graph hold a place, packed, part by part.
+
+    What was read once is kept, as far as `kept_bytes_max` goes: questions are many, and of the same places.
+    """
+
+    def __init__(self, rows: npt.NDArray[np.uint64], kept_bytes_max: int) -> None:
+        self._rows, self._left = rows, kept_bytes_max
+        self._kept: dict[tuple[int, int], Any] = {}
+
+    def reader(self, start: int) -> Callable[[int], Any]:
+        """What reads a place in each marking of the part from `start` on."""
+        return cache(partial(self._holds, start))
+
+    def _holds(self, start: int, place: int) -> Any:
+        if (kept := self._kept.get((start, place))) is not None:
+            return kept
+        found = packed((self._rows[start : start + PART, place // 64] & np.uint64(1 << place % 64)) != 0)
+        if found.nbytes <= self._left:
+            self._left -= found.nbytes
+            self._kept[start, place] = found
+        return found
 
 
 def column(bitmap: bytes) -> Column:

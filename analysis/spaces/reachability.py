@@ -7,8 +7,8 @@ first, and answers questions of graph theory; here markings get their names, sta
 Every witness is replayed by the reference player before anyone sees it. The engine is fast and therefore not trusted:
 a wrong path must become an internal error, never a counterexample that misleads an engineer.
 
-Columns are computed in chunks, because a column for each place of ten million markings takes more memory than the
-graph.
+Columns are computed part by part, because a column of Booleans for each place of ten million markings takes more memory
+than the graph; those of places are kept packed as far as they fit, because questions are many and of the same places.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from firable.analysis.compiled import engine_limits, flat
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.spaces.space import Derived, Witnesses
 from firable.nets.diagnostics import Diagnostic, InputError
-from firable.nets.net import Marking, Net
+from firable.nets.net import Fairness, Marking, Net
 from firable.nets.verdict import Cost, Witness
 from firable.semantics.algebra import Bitwise, BooleanAlgebra
-from firable.semantics.firing import Valuation
+from firable.semantics.firing import Valuation, firable
 from firable.semantics.player import FiringSet
 from firable.semantics.trace import Discipline
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-    from firable.analysis.spaces.columns import Column, Components
+    from firable.analysis.spaces.columns import Column, Components, Places
 
 __all__ = [
     "Budget",
@@ -45,7 +45,8 @@ __all__ = [
     "explore",
 ]
 
-_CHUNK: Final = 1 << 16
+_KEPT_SHARE: Final = 8
+"""The columns of places that are kept take at most this part of the memory that the exploration may take."""
 _METHODS: Final = {
     Discipline.INTERLEAVING: "reachability graph, interleaving",
     Discipline.STEP: "reachability graph, synchronous steps",
@@ -173,21 +174,32 @@ class ReachabilityGraph(Derived["Column"]):
 
         return words_of(self.engine.markings_bytes(), self.engine.words)
 
+    @cached_property
+    def _places(self) -> Places:
+        from firable.analysis.spaces.columns import Places
+
+        return Places(self._words, self.budget.memory_bytes // _KEPT_SHARE)
+
     def where(self, term: Callable[[BooleanAlgebra[Any], Valuation[Any]], Any]) -> Column:
         """The value of a Boolean term at every marking; `term` gets the algebra and the reader of places.
 
         Raises `BudgetExceeded`.
         """
-        from firable.analysis.spaces.columns import COLUMNS, reader, unpacked
+        from firable.analysis.spaces.columns import COLUMNS, PART, unpacked
 
         result = self.none()
-        for start in range(0, self.n_markings, _CHUNK):
+        for start in range(0, self.n_markings, PART):
             if start and self.deadline.over:
                 raise BudgetExceeded(REASONS["time"])
-            rows = self._words[start : start + _CHUNK]
-            found = unpacked(term(COLUMNS, reader(rows)))
-            result[start : start + _CHUNK] = found[: len(rows)] if found.ndim else found
+            part = result[start : start + PART]
+            found = unpacked(term(COLUMNS, self._places.reader(start)))
+            part[:] = found[: len(part)] if found.ndim else found
         return result
+
+    def some_may_fire(self, some: Iterable[int]) -> Column:
+        """The markings in which one of some transitions may fire, in one pass over all markings."""
+        openable = [t for t in some if self.net.transitions[t].openable]
+        return self.where(lambda a, holds: a.disjunction(firable(a, self.net, t, holds) for t in openable))
 
     def none(self) -> Column:
         """The empty set of markings."""
@@ -301,6 +313,15 @@ class ReachabilityGraph(Derived["Column"]):
 
         found = self.engine.components(None if within is None else within.tobytes(), **self._limits)
         return Components(numbers(found.of()), numbers(found.sizes()), column(found.bottom()), column(found.trivial()))
+
+    def fair_components(self, within: Column, fairness: Fairness) -> npt.NDArray[np.uint32]:
+        """For each marking the component in which a fair run can go on for ever inside a set, or `NO_COMPONENT`.
+
+        A run that meets all markings of such a component again and again, and fires all that fires in it, is fair.
+        """
+        from firable.analysis.spaces.columns import numbers
+
+        return numbers(self.engine.fair(within.tobytes(), fairness.value, **self._limits))
 
     def edges(self) -> tuple[npt.NDArray[np.uint64], npt.NDArray[np.uint32]]:
         """The edges as compressed rows: the offset of each marking's row, and the targets."""

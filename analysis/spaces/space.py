@@ -175,6 +175,10 @@ class StateSpace(Protocol[S]):
         """The markings in which a transition is firable and some valuation opens its external gates."""
         ...
 
+    def some_may_fire(self, some: Iterable[int]) -> S:
+        """The markings in which one of some transitions may fire."""
+        ...
+
     def in_contact(self, t: int) -> S:
         """The markings in contact at a transition."""
         ...
@@ -240,6 +244,10 @@ class Derived(Generic[S]):
         if not self.net.transitions[t].openable:
             return self.algebra.disjunction(())
         return self.where(lambda algebra, holds: firable(algebra, self.net, t, holds))
+
+    def some_may_fire(self: StateSpace[S], some: Iterable[int]) -> S:
+        """The markings in which one of some transitions may fire."""
+        return self.algebra.disjunction(map(self.may_fire, some))
 
     def in_contact(self: StateSpace[S], t: int) -> S:
         """The markings in contact at a transition."""

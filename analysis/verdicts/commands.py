@@ -212,7 +212,7 @@ def _senders(net: Net, places: tuple[int, ...]) -> tuple[int, ...]:
 
 def _sources(space: StateSpace[S], places: tuple[int, ...]) -> S:
     """The markings in which a transition may fire that puts a token on one of the places."""
-    return space.algebra.disjunction(space.may_fire(t) for t in _senders(space.net, places))
+    return space.some_may_fire(_senders(space.net, places))
 
 
 def no_command_in_initial_marking(space: StateSpace[Any]) -> Verdict:

@@ -1,16 +1,9 @@
 """Response under fairness: does every fair run that meets p meet q afterwards?
 
 The statement AG (p -> AF q) fails iff from a reachable marking with p and without q a run goes on for ever without q
-and is fair, or ends in a deadlock before q. Within the markings without q:
-
-- *no fairness*: any cycle will do;
-- *weak*: no transition stays enabled for ever without firing. A strongly connected component holds such a run iff for
-  each transition it has a marking in which the transition is disabled or an edge that fires it: these are Büchi
-  conditions, so the maximal components suffice;
-- *strong*: a transition that is enabled again and again fires again and again. That is a Streett condition: where a
-  component enables a transition that it never fires, no fair run stays among the markings that enable it, so they are
-  taken out and the rest is decomposed again, until a component is left in which each enabled transition also fires, or
-  nothing is (Emerson and Lei 1987, "Modalities for model checking").
+and is fair, or ends in a deadlock before q. A run is *weakly* fair if no transition stays enabled for ever without
+firing, and *strongly* if each that is enabled again and again fires again and again. In a graph, among the markings
+without q, the components in which such a run can go on are found edge by edge (`engine/src/fairness.rs`).
 
 Enabled means firable and openable, external gates free: that a gate opens at last is part of the assumption, as the
 statement of the verdict says. Under steps a transition fires when the step holds it.
@@ -27,12 +20,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from firable.analysis._engine import BudgetExceeded
 from firable.analysis.compiled import engine_limits
 from firable.analysis.question import Answer, no, yes
-from firable.analysis.spaces.columns import NO_COMPONENT, Column, Components, first, indexes
+from firable.analysis.spaces.columns import NO_COMPONENT, Column, first
 from firable.analysis.spaces.reachability import ReachabilityGraph
 from firable.analysis.spaces.space import S, StateSpace, WitnessError, Witnesses
 from firable.analysis.verdicts.fair_runs import fair_markings
@@ -42,10 +34,7 @@ from firable.nets.net import Fairness, Marking, Property
 from firable.semantics.algebra import BOOL
 from firable.semantics.formulas import evaluate
 from firable.semantics.player import FiringSet, holds_in
-from firable.semantics.trace import Discipline
 
-Matrix = npt.NDArray[np.bool_]
-"""One Boolean for each component and transition."""
 GOING_ON_SHARE, GOING_ON_SECONDS = 0.25, 10.0
 """The part of the time left, and the time, that sets may take to go on with a run: it decides nothing any more."""
 
@@ -100,16 +89,17 @@ def _then(of: Property) -> Formula:
 
 def _by_components(graph: ReachabilityGraph, of: Property) -> Answer:
     without = ~graph.satisfying(_then(of))
-    fair = _Fair(graph, of.fairness, without)
+    component = graph.fair_components(without, of.fairness)
+    around = component != NO_COMPONENT
     stuck = graph.deadlocks & without
-    start = first(graph.satisfying(of.formula) & graph.backward(fair.markings | stuck, without) & without)
+    start = first(graph.satisfying(of.formula) & graph.backward(around | stuck, without) & without)
     if start is None:
         return yes()
     prefix = [tuple(fired) for fired in graph.engine.path_to(start, **engine_limits(graph.deadline))]
     prefix_length = len(prefix)
-    tail, entry = _way(graph, start, fair.markings | stuck, without)
+    tail, entry = _way(graph, start, around | stuck, without)
     prefix += tail
-    cycle = fair.cycle(entry) if not stuck[entry] else []
+    cycle = [] if stuck[entry] else _cycle(graph, component == component[entry], of.fairness, entry)
     check_lasso(graph.witnesses, of, prefix, prefix_length, cycle)
     return no((), graph.witnesses.named(prefix, graph.marking(entry), cycle, _told(of, prefix_length, cycle)))
 
@@ -123,97 +113,25 @@ def _way(graph: ReachabilityGraph, source: int, targets: Column, within: Column)
     return [tuple(fired) for fired in firings], target
 
 
-@dataclass
-class _Fair:
-    """The components, among markings without q, in which a fair run can go on for ever."""
-
-    graph: ReachabilityGraph
-    fairness: Fairness
-    without: Column
-    markings: Column = field(init=False)
-    component: npt.NDArray[np.int64] = field(init=False)
-
-    def __post_init__(self) -> None:
-        # `component` numbers the fair components over all rounds; -1 elsewhere.
-        self.markings = np.zeros(self.graph.n_markings, dtype=np.bool_)
-        self.component = np.full(self.graph.n_markings, -1, dtype=np.int64)
-        remaining, n_found = self.without, 0
-        while remaining.any():
-            components = self.graph.components(remaining)
-            inside = components.nontrivial
-            if not inside.any():
-                return
-            of = components.of.astype(np.int64)
-            unfair, to_remove = self._unfair(components, inside)
-            fair = inside.copy()
-            fair[inside] = ~unfair[of[inside]]
-            self.markings |= fair
-            self.component[fair] = of[fair] + n_found
-            n_found += len(components.sizes)
-            if self.fairness is not Fairness.STRONG:
-                return
-            remaining = inside & ~fair & ~to_remove
-
-    def _unfair(self, components: Components, inside: Column) -> tuple[Column, Column]:
-        """The components that hold no fair run as they are, and the markings none of their fair runs stays among."""
-        n_components, to_remove = len(components.sizes), np.zeros_like(inside)
-        unfair = np.zeros(n_components, dtype=np.bool_)
-        if self.fairness is Fairness.NONE:
-            return unfair, to_remove
-        fires = self._fires(components, inside)
-        of = components.of[inside]
-        for t in range(len(self.graph.net.transitions)):
-            enabled = self.graph.may_fire(t)
-            count = np.bincount(of[enabled[inside]], minlength=n_components)
-            if self.fairness is Fairness.WEAK:
-                unfair |= (count == components.sizes) & ~fires[:, t]
-            else:
-                bad = (count > 0) & ~fires[:, t]
-                unfair |= bad
-                to_remove[inside] |= bad[of] & enabled[inside]
-        unfair &= ~components.trivial
-        return unfair, to_remove
-
-    def _fires(self, components: Components, inside: Column) -> Matrix:
-        """Which transitions each component fires on an edge that stays in it."""
-        graph, of = self.graph, components.of
-        fires = np.zeros((len(components.sizes), len(graph.net.transitions)), dtype=np.bool_)
-        if graph.discipline is Discipline.STEP:
-            for source in indexes(inside):
-                for fired, target in graph.successors(source):
-                    if of[target] == of[source]:
-                        fires[of[source], list(fired)] = True
-            return fires
-        offsets, targets = graph.edges()
-        # Under interleaving the edges of a row stand in the order of the transitions that may fire. So the k-th edge
-        # of each marking fires its k-th enabled transition: count the enabled ones while going through them.
-        next_edge = offsets[:-1].astype(np.int64)
-        for t in range(len(graph.net.transitions)):
-            sources = np.flatnonzero(graph.may_fire(t))
-            reached = targets[next_edge[sources]]
-            next_edge[sources] += 1
-            stays = (of[sources] != NO_COMPONENT) & (of[sources] == of[reached])
-            fires[of[sources][stays], t] = True
-        return fires
-
-    def cycle(self, entry: int) -> list[FiringSet]:
-        """A closed walk from a marking of a fair component through that component, which is itself fair."""
-        graph, net = self.graph, self.graph.net
-        within: Column = self.component == self.component[entry]
-        walk = _Walk(graph, within, entry)
-        for t in range(len(net.transitions)) if self.fairness is not Fairness.NONE else ():
-            enabled = graph.may_fire(t) & within
-            if self.fairness is Fairness.WEAK:
-                disabled = within & ~enabled
-                if disabled.any():
-                    if not any(disabled[index] for index in walk.visited):
-                        walk.go(disabled)
-                    continue
-            if enabled.any() and t not in walk.fired:
+def _cycle(graph: ReachabilityGraph, within: Column, fairness: Fairness, entry: int) -> list[FiringSet]:
+    """A closed walk from a marking of a fair component (`within`) through that component, which is itself fair."""
+    walk = _Walk(graph, within, entry)
+    if fairness is Fairness.STRONG:
+        for t, count in enumerate(graph.fired()):
+            if count and t not in walk.fired and (enabled := graph.may_fire(t) & within).any():
                 walk.fire(t, enabled)
-        if not walk.firings:
-            walk.step()
-        return walk.back_to(entry)
+    elif fairness is Fairness.WEAK:
+        while owed := walk.lasting - walk.fired:
+            t = min(owed)
+            enabled = graph.may_fire(t) & within
+            disabled = within & ~enabled
+            if disabled.any():
+                walk.go(disabled)
+            else:
+                walk.fire(t, enabled)
+    if not walk.firings:
+        walk.step()
+    return walk.back_to(entry)
 
 
 @dataclass
@@ -224,11 +142,12 @@ class _Walk:
     within: Column
     at: int
     firings: list[FiringSet] = field(default_factory=list)
-    visited: set[int] = field(default_factory=set)
     fired: set[int] = field(default_factory=set)
+    lasting: set[int] = field(init=False)
+    """The transitions that were enabled all the time."""
 
     def __post_init__(self) -> None:
-        self.visited.add(self.at)
+        self.lasting = self._enabled()
 
     def go(self, targets: Column) -> None:
         """Go on to the nearest target."""
@@ -258,8 +177,12 @@ class _Walk:
     def _move(self, fired: FiringSet, target: int) -> None:
         self.firings.append(fired)
         self.fired.update(fired)
-        self.visited.add(target)
         self.at = target
+        self.lasting &= self._enabled()
+
+    def _enabled(self) -> set[int]:
+        """The transitions that some edge fires: under steps, too, each that is enabled is in one that may be taken."""
+        return {t for fired, _ in self.graph.successors(self.at) for t in fired}
 
 
 def check_lasso(

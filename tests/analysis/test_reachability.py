@@ -12,7 +12,7 @@ from support.reference import load_net
 from support.ring_nets import ring_nets
 
 from firable.analysis.check import check
-from firable.analysis.spaces import reachability
+from firable.analysis.spaces import columns
 from firable.analysis.spaces.columns import first
 from firable.analysis.spaces.reachability import Budget, IncompleteGraph, explore
 from firable.analysis.spaces.space import WitnessError
@@ -54,7 +54,7 @@ def test_what_each_bottom_component_meets_is_always_possible(net: Net, disciplin
 def test_columns_do_not_depend_on_the_size_of_their_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     graph = explore(load_net("cell1_mc_late"))
     whole = graph.satisfying(parse_formula("firable(G2) or deadlock"))
-    monkeypatch.setattr(reachability, "_CHUNK", 7)
+    monkeypatch.setattr(columns, "PART", 7)
     assert np.array_equal(graph.satisfying(parse_formula("firable(G2) or deadlock")), whole)
 
 

@@ -1,185 +1,17 @@
-"""The engine against the definitions: an explorer written here from SEMANTICS, and networkx for what graphs mean."""
+"""The engine against the definitions: an explorer written from SEMANTICS, budgets, and all that can end it early."""
 
 from __future__ import annotations
 
-import itertools
 import signal
 import threading
-from collections import deque
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from support.examples import examples
+from support.engine_nets import Drawn, Naive, Row, both, digraph, explore, explored, mask, replayed
 
 from firable.analysis import _engine
-
-Row = tuple[list[int], list[int], list[int], list[int], list[tuple[int, bool]]]
-Edge = tuple[frozenset[int], int]
-
-
-@dataclass(frozen=True)
-class Drawn:
-    n_places: int
-    rows: list[Row]
-    initial: list[int]
-
-
-def mask(places: list[int]) -> int:
-    return sum(1 << p for p in set(places))
-
-
-class Naive:
-    """Everything by the definition, with no regard to cost."""
-
-    def __init__(self, net: Drawn, *, step: bool) -> None:
-        self.rows = net.rows
-        self.step = step
-        self.start = mask(net.initial)
-        self.graph: dict[int, set[Edge]] = {}
-        self.distance = {self.start: 0}
-        queue = deque([self.start])
-        while queue:
-            marking = queue.popleft()
-            self.graph[marking] = set(self.edges(marking))
-            for _, after in self.graph[marking]:
-                if after not in self.distance:
-                    self.distance[after] = self.distance[marking] + 1
-                    queue.append(after)
-
-    def firable(self, t: int, marking: int) -> bool:
-        inputs, outputs, permissive, inhibitive, _ = self.rows[t]
-        full, empty = mask(inputs) | mask(permissive), mask(outputs) | mask(inhibitive)
-        return marking & full == full and not marking & empty
-
-    def contact(self, t: int, marking: int) -> bool:
-        inputs, outputs, permissive, inhibitive, _ = self.rows[t]
-        full = mask(inputs) | mask(permissive)
-        held = marking & full == full and not marking & mask(inhibitive)
-        return held and bool(marking & mask(outputs) & ~mask(inputs))
-
-    def openable(self, t: int) -> bool:
-        return all((s, not wanted) not in self.rows[t][4] for s, wanted in self.rows[t][4])
-
-    def may_fire(self, marking: int) -> list[int]:
-        return [t for t in range(len(self.rows)) if self.firable(t, marking) and self.openable(t)]
-
-    def after(self, marking: int, fired: frozenset[int]) -> int:
-        for t in fired:
-            marking &= ~mask(self.rows[t][0])
-        for t in fired:
-            marking |= mask(self.rows[t][1])
-        return marking
-
-    def edges(self, marking: int) -> Iterator[Edge]:
-        if not self.step:
-            for t in self.may_fire(marking):
-                yield frozenset([t]), self.after(marking, frozenset([t]))
-            return
-        signals = sorted({s for row in self.rows for s, _ in row[4]})
-        steps: set[frozenset[int]] = set()
-        for values in itertools.product([False, True], repeat=len(signals)):
-            valuation = dict(zip(signals, values, strict=True))
-            enabled = [
-                t
-                for t in range(len(self.rows))
-                if self.firable(t, marking) and all(valuation[s] == wanted for s, wanted in self.rows[t][4])
-            ]
-            free = [
-                frozenset(chosen)
-                for size in range(len(enabled) + 1)
-                for chosen in itertools.combinations(enabled, size)
-                if not any(self.conflict(t, u) for t, u in itertools.combinations(chosen, 2))
-            ]
-            steps |= {chosen for chosen in free if not any(chosen < other for other in free)}
-        for fired in steps - {frozenset()}:
-            yield fired, self.after(marking, fired)
-
-    def conflict(self, t: int, u: int) -> bool:
-        return bool(mask(self.rows[t][0]) & mask(self.rows[u][0]) or mask(self.rows[t][1]) & mask(self.rows[u][1]))
-
-
-@st.composite
-def nets(draw: st.DrawFn) -> Drawn:
-    """Small nets, their places spread over one to several words.
-
-    Most transitions are drawn so that they are firable in M0 or after another, else conflicts hardly ever show.
-    """
-    count = draw(st.integers(0, 6))
-    spread = draw(st.sampled_from([1, 1, 13, 30, 45, 62, 100, 200]))
-    everywhere = [p * spread for p in range(count)]
-    initial = [p for p in everywhere if draw(st.booleans())]
-    empty = [p for p in everywhere if p not in initial]
-
-    def some(places: list[int], most: int) -> list[int]:
-        return draw(st.lists(st.sampled_from(places), max_size=most)) if places else []
-
-    def row() -> Row:
-        kind = draw(st.integers(0, 4))
-        inputs, outputs = {0: (everywhere, everywhere), 1: (empty, initial)}.get(kind, (initial, empty))
-        takes, puts = some(inputs, 2), some(outputs, 2)
-        gated = draw(st.integers(0, 2)) == 0
-        permissive, inhibitive = (
-            (some(everywhere + 3 * takes, 2), some(everywhere + 3 * puts, 1)) if gated else ([], [])
-        )
-        literals = draw(st.lists(st.tuples(st.integers(0, 1), st.booleans()), max_size=2))
-        return takes, puts, permissive, inhibitive, literals
-
-    return Drawn(count * spread, [row() for _ in range(draw(st.integers(0, 5)))], initial)
-
-
-def explore(
-    net: Drawn,
-    *,
-    step: bool = False,
-    max_markings: int = 1 << 20,
-    max_memory_bytes: int = 1 << 28,
-    max_seconds: float | None = None,
-) -> _engine.Graph:
-    return _engine.explore(
-        net.n_places,
-        net.rows,
-        net.initial,
-        step=step,
-        max_markings=max_markings,
-        max_memory_bytes=max_memory_bytes,
-        max_seconds=max_seconds,
-    )
-
-
-def explored(net: Drawn, *, step: bool) -> _engine.Graph:
-    graph = explore(net, step=step)
-    assert graph.complete
-    assert graph.reason is None
-    return graph
-
-
-def both(test: Callable[[Drawn, bool], None]) -> Callable[[], None]:
-    """A generated net under either discipline."""
-    return examples(125)(given(net=nets(), step=st.booleans())(test))
-
-
-def digraph(graph: _engine.Graph) -> nx.DiGraph[int]:
-    found: nx.DiGraph[int] = nx.DiGraph()
-    found.add_nodes_from(range(graph.n_markings))
-    found.add_edges_from((i, j) for i in range(graph.n_markings) for _, j in graph.successors(i))
-    return found
-
-
-def replayed(naive: Naive, marking: int, sequence: list[list[int]]) -> int:
-    """Fires a sequence, each set of which must be an edge by the definition."""
-    for fired in sequence:
-        assert (frozenset(fired), naive.after(marking, frozenset(fired))) in naive.graph[marking]
-        marking = naive.after(marking, frozenset(fired))
-    return marking
-
-
-def bitmap(graph: _engine.Graph, chosen: set[int]) -> bytes:
-    return bytes(i in chosen for i in range(graph.n_markings))
 
 
 @both
@@ -228,115 +60,6 @@ def test_sequences_replay_and_are_shortest(net: Drawn, step: bool) -> None:
         sequence = graph.path_to(i)
         assert replayed(naive, naive.start, sequence) == graph.marking(i)
         assert len(sequence) == naive.distance[graph.marking(i)]
-
-
-@examples(125)
-@given(net=nets(), step=st.booleans(), data=st.data())
-def test_paths_within_a_set_are_those_of_networkx(net: Drawn, step: bool, data: st.DataObject) -> None:
-    naive, graph = Naive(net, step=step), explored(net, step=step)
-    everything = digraph(graph)
-    indexes = st.integers(0, graph.n_markings - 1)
-    start = data.draw(indexes)
-    targets = data.draw(st.sets(indexes, max_size=2))
-    within = data.draw(st.one_of(st.just(set(everything)), st.sets(indexes)))
-    allowed: nx.DiGraph[int] = nx.DiGraph(everything)
-    allowed.remove_edges_from([(i, j) for i, j in everything.edges if i not in within or i in targets])
-    lengths = nx.single_source_shortest_path_length(allowed, start)
-    found = graph.path_between(start, sorted(targets), bitmap(graph, within))
-    if not targets & set(lengths):
-        assert found is None
-    else:
-        assert found is not None
-        sequence, reached = found
-        assert reached in targets
-        assert replayed(naive, graph.marking(start), sequence) == graph.marking(reached)
-        assert len(sequence) == min(lengths[i] for i in targets if i in lengths)
-    can = set(targets)
-    for target in targets:
-        can |= nx.ancestors(allowed, target)
-    assert graph.backward(bitmap(graph, targets), sorted(within)) == bitmap(graph, can)
-
-
-@examples(63)
-@given(net=nets(), step=st.booleans(), data=st.data())
-def test_one_edge_back_is_that_of_the_definition(net: Drawn, step: bool, data: st.DataObject) -> None:
-    naive, graph = Naive(net, step=step), explored(net, step=step)
-    targets = data.draw(st.sets(st.integers(0, graph.n_markings - 1)))
-    by = data.draw(st.sets(st.sampled_from(range(len(net.rows))))) if net.rows else set()
-    into = {graph.marking(i) for i in targets}
-    fired_into = [
-        [fired for fired, after in naive.graph[graph.marking(i)] if after in into] for i in range(graph.n_markings)
-    ]
-    assert graph.before(bitmap(graph, targets)) == bytes(bool(edges) for edges in fired_into)
-    assert graph.before(sorted(targets), sorted(by)) == bytes(any(f & by for f in edges) for edges in fired_into)
-    within = data.draw(st.sets(st.integers(0, graph.n_markings - 1)))
-    can, bigger = set(targets), True
-    while bigger:
-        there = {graph.marking(i) for i in can}
-        more = {i for i in within if any(f & by and after in there for f, after in naive.graph[graph.marking(i)])}
-        can, bigger = can | more, not more <= can
-    assert graph.backward(sorted(targets), sorted(within), sorted(by)) == bitmap(graph, can)
-
-
-@examples(63)
-@given(net=nets(), step=st.booleans(), data=st.data())
-def test_endless_runs_are_those_into_cycles_within_the_set(net: Drawn, step: bool, data: st.DataObject) -> None:
-    graph = explored(net, step=step)
-    everything = digraph(graph)
-    within = data.draw(st.one_of(st.none(), st.sets(st.integers(0, graph.n_markings - 1))))
-    inside = everything.subgraph(everything if within is None else within)
-    endless = {
-        i for part in nx.strongly_connected_components(inside) for i in part if inside.subgraph(part).number_of_edges()
-    }
-    for i in list(endless):
-        endless |= nx.ancestors(inside, i)
-    assert graph.endless(None if within is None else bitmap(graph, within)) == bitmap(graph, endless)
-
-
-@examples(63)
-@given(net=nets(), step=st.booleans(), data=st.data())
-def test_components_are_those_of_networkx(net: Drawn, step: bool, data: st.DataObject) -> None:
-    graph = explored(net, step=step)
-    everything = digraph(graph)
-    within = data.draw(st.one_of(st.none(), st.sets(st.integers(0, graph.n_markings - 1))))
-    inside = everything.subgraph(everything if within is None else within)
-    components = graph.components(None if within is None else sorted(within))
-    of = np.frombuffer(components.of(), "<u4")
-    expected = [set(c) for c in nx.strongly_connected_components(inside)]
-    found = [set(np.flatnonzero(of == c).tolist()) for c in range(len(components))]
-    assert sorted(map(sorted, found)) == sorted(map(sorted, expected))
-    assert np.frombuffer(components.sizes(), "<u4").tolist() == [len(c) for c in found]
-    assert set(np.flatnonzero(of == 2**32 - 1).tolist()) == set(everything) - set(inside)
-    assert all(of[i] >= of[j] for i, j in inside.edges)
-    for members, bottom, trivial in zip(found, components.bottom(), components.trivial(), strict=True):
-        assert bottom == (not any(j not in members for i in members for j in inside.successors(i)))
-        assert trivial == (not any(j in members for i in members for j in inside.successors(i)))
-
-
-@both
-def test_live_home_and_reversible_follow_from_reachability(net: Drawn, step: bool) -> None:
-    naive, graph = Naive(net, step=step), explored(net, step=step)
-    everything = digraph(graph)
-    reach = {i: nx.descendants(everything, i) | {i} for i in everything}
-    fires = {i: {t for f, _ in naive.graph[graph.marking(i)] for t in f} for i in everything}
-    for t, live in enumerate(graph.live()):
-        assert live == all(any(t in fires[j] for j in reach[i]) for i in everything)
-    assert graph.reversible() == all(0 in reach[i] for i in everything)
-    home = {j for j in everything if all(j in reach[i] for i in everything)}
-    assert graph.home_markings() == bitmap(graph, home)
-    nearest = next(i for i in everything if all(i in reach[j] for j in reach[i]))
-    assert graph.bottom() == bitmap(graph, reach[nearest])
-
-
-@both
-def test_edges_and_markings_as_columns_are_the_same_graph(net: Drawn, step: bool) -> None:
-    graph = explored(net, step=step)
-    offsets, targets = (np.frombuffer(part, kind) for part, kind in zip(graph.edges(), ["<u8", "<u4"], strict=True))
-    assert len(targets) == graph.n_edges
-    words = np.frombuffer(graph.markings_bytes(), "<u8").reshape(graph.n_markings, graph.words)
-    for i in range(graph.n_markings):
-        assert targets[offsets[i] : offsets[i + 1]].tolist() == [j for _, j in graph.successors(i)]
-        assert sum(int(word) << 64 * k for k, word in enumerate(words[i])) == graph.marking(i)
 
 
 def machines(count: int, *, pad: int = 0, gated: bool = False) -> Drawn:
@@ -537,6 +260,7 @@ def test_every_long_question_ends_by_the_clock_and_when_cancelled(step: bool) ->
         lambda **limits: graph.path_between(0, never, **limits),
         lambda **limits: graph.before(bytes(len(far) * [1]), **limits),
         lambda **limits: graph.endless(**limits),
+        lambda **limits: graph.fair(bytes(len(far) * [1]), "strong", **limits),
         lambda **limits: graph.endless(bytes(len(far) * [1]), **limits),
     ]
     for ask in questions:

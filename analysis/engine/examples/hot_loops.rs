@@ -100,7 +100,7 @@ fn main() {
             "explore" | "two" => {}
             "bottoms" => drop(Bottoms::new(&space, &mut watch).expect("fits")),
             "edges" => drop(Csr::new(&space, None, &space.memory.clone(), &mut watch).expect("fits")),
-            "backward" => drop(backward(&space, &initial, None, None, &mut watch).expect("fits")),
+            "backward" => drop(backward(&space, &initial, None, None, None, &mut watch).expect("fits")),
             "endless" => drop(endless(&space, Some(&initial), &mut watch).expect("fits")),
             other => panic!("no work {other}"),
         }

@@ -1,7 +1,7 @@
 //! The edges of the reachability graph as compressed rows: an offset for each marking, and all targets end to end.
 //!
-//! They are stored only where a question walks over them again and again, 4 bytes an edge and 8 a marking within the
-//! memory budget: for the components, and to turn the edges of steps round.
+//! They are stored only where a question walks over them again and again, or one question after the other does, 4 bytes an
+//! edge and 8 a marking within the memory budget: for the components, and turned round for what goes against them.
 
 use crate::batch::Batch;
 use crate::budget::{Memory, Stop, Watch};
@@ -68,6 +68,11 @@ impl Csr {
         let (mut offsets, mut targets) = (memory.filled(0u64, space.len() + 1)?, Vec::new());
         fill_steps(space, |_| true, such, &mut offsets, &mut targets, memory, watch)?;
         Ok(Csr { offsets, targets: Region::Heap(targets) })
+    }
+
+    /// Bytes that the rows take.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.offsets.as_slice()) + size_of_val(self.targets.all())
     }
 
     /// The successors of a marking.

@@ -27,6 +27,14 @@ impl Fired<'_> {
         }
     }
 
+    /// Calls `visit` with each of the transitions.
+    pub fn each(self, visit: &mut impl FnMut(u32)) {
+        match self {
+            Fired::One(t) => visit(t),
+            Fired::Step(choices) => choices.iter().flat_map(|choice| choice.fired.iter()).for_each(|&t| visit(t)),
+        }
+    }
+
     /// The transitions, ascending.
     pub fn transitions(self) -> Vec<u32> {
         match self {

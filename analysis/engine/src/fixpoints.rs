@@ -1,15 +1,19 @@
 //! What leads where, one step or any number of them: EX, EF (E[U]) and EG over the stored markings.
 //!
-//! Under interleaving no edge is stored. The rule runs backwards from 64 markings at a time (`Fan`), and what waits is
-//! taken in the order of the indexes (`Agenda`), so a search against the edges costs about what the exploration did. One
-//! step back is asked from whichever side is smaller: the predecessors of few targets are computed, and of many, each
+//! Under interleaving no edge is stored for one question. The rule runs backwards from 64 markings at a time (`Fan`), and
+//! what waits is taken in the order of the indexes (`Agenda`), so a search against the edges costs about what the
+//! exploration did; more where many transitions differ only in what they ask before, as those of a cell with its machines
+//! do, because most of what they come from was never reached. So from the second question on the edges are stored, turned
+//! round, where the budget of memory has room for them (`against`): a search then costs some ten nanoseconds an edge.
+//!
+//! One step back is asked from whichever side is smaller: the predecessors of few targets are computed, and of many, each
 //! marking looks for one edge into them, of which it usually finds one at once.
 //!
 //! The greatest fixpoint EG counts for each marking the edges that stay inside; a marking with none is taken out, and its
 //! predecessors count one less (Arnold and Crubille, "A linear algorithm to solve fixed-point equations on transition
 //! systems", 1988). Sweeping until nothing changes was rejected: on a chain it is quadratic.
 //!
-//! Under steps, where the rule has no simple reverse, edges are stored and turned round (`csr.rs`).
+//! Under steps, where the rule has no simple reverse, edges are stored for each question.
 
 use crate::bits::{Agenda, Bits};
 use crate::budget::{Stop, Watch};
@@ -20,13 +24,23 @@ use crate::fan::Fan;
 use crate::marking::Width;
 use crate::with_width;
 
+/// All edges of a graph, turned round, to be kept: their bytes count as held by the graph.
+pub fn against(space: &Space, watch: &mut Watch<'_>) -> Result<Csr, Stop> {
+    let memory = space.memory.clone();
+    let edges = Csr::new(space, None, &memory, watch)?.reversed(&memory, watch)?;
+    space.memory.claim(edges.bytes())?;
+    Ok(edges)
+}
+
 /// The markings from which a target can be reached, one byte each, targets included; every marking on the way before
-/// the target is in `within`; with `by`, by edges that fire one of these transitions.
+/// the target is in `within`; with `by`, by edges that fire one of these transitions. `against` are all edges turned
+/// round, where they are stored.
 pub fn backward(
     space: &Space,
     targets: &[u8],
     within: Option<&[u8]>,
     by: Option<&[u32]>,
+    against: Option<&Csr>,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<u8>, Stop> {
     let memory = space.memory.clone();
@@ -38,12 +52,13 @@ pub fn backward(
         !reach.has(source as usize) && within.is_none_or(|within| within[source as usize] != 0)
     };
     let mut taken = Vec::with_capacity(64);
-    if space.step {
-        let edges = match by {
-            None => Csr::new(space, None, &memory, watch)?,
-            Some(_) => Csr::of_steps(space, one_of(space, by), &memory, watch)?,
-        };
-        let edges = edges.reversed(&memory, watch)?;
+    let against = against.filter(|_| by.is_none());
+    let own = match by {
+        _ if !space.step || against.is_some() => None,
+        None => Some(Csr::new(space, None, &memory, watch)?.reversed(&memory, watch)?),
+        Some(_) => Some(Csr::of_steps(space, one_of(space, by), &memory, watch)?.reversed(&memory, watch)?),
+    };
+    if let Some(edges) = against.or(own.as_ref()) {
         while agenda.take(&mut taken) {
             for &index in &taken {
                 let sources = edges.targets(index);
@@ -97,9 +112,23 @@ fn one_of(space: &Space, by: Option<&[u32]>) -> impl Fn(Fired<'_>) -> bool {
 }
 
 /// The markings with an edge into the targets, one byte each; with `by`, an edge that fires one of these transitions.
-pub fn before(space: &Space, targets: &[u8], by: Option<&[u32]>, watch: &mut Watch<'_>) -> Result<Vec<u8>, Stop> {
+/// `against` as in `backward`.
+pub fn before(
+    space: &Space,
+    targets: &[u8],
+    by: Option<&[u32]>,
+    against: Option<&Csr>,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<u8>, Stop> {
     let memory = space.memory.clone();
     let mut found = memory.filled(0u8, space.len())?;
+    if let Some(edges) = against.filter(|_| by.is_none()) {
+        for target in (0..space.len() as u32).filter(|&target| targets[target as usize] != 0) {
+            edges.targets(target).iter().for_each(|&source| found[source as usize] = 1);
+            watch.tick(1 + edges.targets(target).len())?;
+        }
+        return Ok(found);
+    }
     if space.step {
         let fires = one_of(space, by);
         let mut edges = Edges::new(space);

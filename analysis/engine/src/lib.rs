@@ -30,6 +30,8 @@ pub mod exact;
 #[forbid(unsafe_code)]
 pub mod explore;
 #[forbid(unsafe_code)]
+pub mod fairness;
+#[forbid(unsafe_code)]
 pub mod fan;
 #[forbid(unsafe_code)]
 pub mod fixpoints;

@@ -1,5 +1,6 @@
 //! `Graph`: a reachability graph, its figures, and the questions that are asked of it.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use pyo3::exceptions::{PyIndexError, PyValueError};
@@ -13,9 +14,10 @@ use crate::budget::{Memory, Stop, Watch};
 use crate::csr::Csr;
 use crate::edges::Edges;
 use crate::explore::Space;
+use crate::fairness::Fairness;
 use crate::scc::Scc;
 use crate::table::NONE;
-use crate::{fixpoints, paths};
+use crate::{fairness, fixpoints, paths};
 
 /// A reachability graph; see the stub `_engine.pyi` for the meaning of each member.
 #[pyclass(frozen, module = "firable.analysis._engine")]
@@ -23,6 +25,11 @@ pub(crate) struct Graph {
     space: Space,
     scc: OnceLock<Arc<Scc>>,
     bottoms: OnceLock<Bottoms>,
+    /// The edges turned round, from the second question on that goes against them; none where they do not fit.
+    against: OnceLock<Option<Csr>>,
+    asked_against: AtomicBool,
+    /// Bytes held when the exploration ended.
+    explored_bytes: usize,
 }
 
 /// A set of markings from Python: indexes, or one byte for each marking.
@@ -34,7 +41,15 @@ enum Markings<'py> {
 
 impl Graph {
     pub(crate) fn new(space: Space) -> Self {
-        Graph { space, scc: OnceLock::new(), bottoms: OnceLock::new() }
+        let explored_bytes = space.memory.used();
+        Graph {
+            space,
+            scc: OnceLock::new(),
+            bottoms: OnceLock::new(),
+            against: OnceLock::new(),
+            asked_against: AtomicBool::new(false),
+            explored_bytes,
+        }
     }
 
     fn long<T: Send>(
@@ -101,6 +116,24 @@ impl Graph {
         Ok(self.bottoms.get_or_init(|| bottoms))
     }
 
+    fn against(&self, py: Python<'_>, patience: &Patience) -> PyResult<Option<&Csr>> {
+        if !self.asked_against.swap(true, Ordering::Relaxed) {
+            return Ok(None);
+        }
+        if let Some(known) = self.against.get() {
+            return Ok(known.as_ref());
+        }
+        let edges = self.long(py, patience, |space, watch| match fixpoints::against(space, watch) {
+            Err(Stop::Memory) => Ok(None),
+            edges => edges.map(Some),
+        })?;
+        if let Err(Some(second)) = self.against.set(edges) {
+            // Somebody has done the same meanwhile.
+            self.space.memory.release(second.bytes());
+        }
+        Ok(self.against.get().and_then(Option::as_ref))
+    }
+
     fn scc(&self, py: Python<'_>, patience: &Patience) -> PyResult<Arc<Scc>> {
         if let Some(scc) = self.scc.get() {
             return Ok(Arc::clone(scc));
@@ -151,7 +184,7 @@ impl Graph {
 
     #[getter]
     fn bytes_per_marking(&self) -> f64 {
-        self.space.memory.used() as f64 / self.space.len() as f64
+        self.explored_bytes as f64 / self.space.len() as f64
     }
 
     #[getter]
@@ -276,8 +309,9 @@ impl Graph {
         let targets = self.bitmap(targets)?;
         let within = within.map(|within| self.bitmap(within)).transpose()?;
         let by = by.map(|by| self.check_transitions(by)).transpose()?;
+        let against = if by.is_none() { self.against(py, &patience)? } else { None };
         let reach = self.long(py, &patience, |space, watch| {
-            fixpoints::backward(space, &targets, within.as_deref(), by.as_deref(), watch)
+            fixpoints::backward(space, &targets, within.as_deref(), by.as_deref(), against, watch)
         })?;
         Ok(PyBytes::new(py, &reach))
     }
@@ -296,6 +330,24 @@ impl Graph {
         let within = self.bitmap(within)?;
         let scc = self.long(py, &patience, |space, watch| Scc::new(space, Some(&within), watch))?;
         Ok(Components { scc: Arc::new(scc) })
+    }
+
+    #[pyo3(signature = (within, fairness, *, max_seconds=None, cancelled=None))]
+    fn fair<'py>(
+        &self,
+        py: Python<'py>,
+        within: Markings<'_>,
+        fairness: &str,
+        max_seconds: Option<f64>,
+        cancelled: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyBytes>> {
+        let patience = Patience::new(max_seconds, cancelled)?;
+        let fairness = Fairness::named(fairness)
+            .ok_or_else(|| PyValueError::new_err(format!("fairness is none, weak or strong, not '{fairness}'")))?;
+        self.whole("that a fair run can go on for ever")?;
+        let within = self.bitmap(within)?;
+        let of = self.long(py, &patience, |space, watch| fairness::fair(space, within, fairness, watch))?;
+        little_endian(py, &of, u32::to_le_bytes)
     }
 
     #[pyo3(signature = (*, max_seconds=None, cancelled=None))]
@@ -365,8 +417,9 @@ impl Graph {
         self.whole("what leads to a set of markings")?;
         let targets = self.bitmap(targets)?;
         let by = by.map(|by| self.check_transitions(by)).transpose()?;
+        let against = if by.is_none() { self.against.get().and_then(Option::as_ref) } else { None };
         let found =
-            self.long(py, &patience, |space, watch| fixpoints::before(space, &targets, by.as_deref(), watch))?;
+            self.long(py, &patience, |space, watch| fixpoints::before(space, &targets, by.as_deref(), against, watch))?;
         Ok(PyBytes::new(py, &found))
     }
 
