@@ -93,13 +93,15 @@ def check(
     *,
     method: Method | str = Method.AUTO,
     queries: Sequence[Query] = (),
+    of_the_net: bool = True,
     progress: Callable[[int, int], object] | None = None,
     tell: Callable[[str], object] | None = None,
     interrupted: Event | None = None,
 ) -> CheckReport:
     """Decide every verdict on a net under a discipline, external gates free, by the method named.
 
-    The verdicts on `queries` follow those on the net's own properties. `progress` is told how many markings and edges
+    The verdicts on `queries` follow those on the net's own properties; where not `of_the_net` these are all that is
+    asked. `progress` is told how many markings and edges
     are found, and `tell` in words how far it is with verdicts that are settled one by one. Ctrl-C, which leaves unknown
     what is not decided yet, sets `interrupted`; where it is set already, for another net, nothing is begun.
 
@@ -119,7 +121,7 @@ def check(
     deadline = Deadline(cancelled=interrupted)
     if budget.seconds is not None:
         deadline = Deadline.after(budget.seconds, interrupted)
-    one = _Check(net, discipline, budget, deadline, interrupted, tuple(queries), progress, tell)
+    one = _Check(net, discipline, budget, deadline, interrupted, tuple(queries), of_the_net, progress, tell)
     if discipline is Discipline.STEP and method not in {Method.EXPLICIT, Method.AUTO}:
         message = f"the method '{method}' knows no synchronous steps"
         raise InputError([Diagnostic("F3006", message, "leave out --method, or name `explicit`")])
@@ -142,6 +144,7 @@ class _Check:
     deadline: Deadline
     interrupted: Event
     queries: tuple[Query, ...]
+    of_the_net: bool
     progress: Callable[[int, int], object] | None
     tell: Callable[[str], object] | None
 
@@ -211,10 +214,11 @@ class _Check:
         """Settle, beside the search for all markings, what others follow from, by quick techniques."""
         if deadline.cancelled is not None and deadline.cancelled.wait(_ALONE_SECONDS):
             return
-        for of, share in FIRST_KNOWERS.items():
+        for of, share in FIRST_KNOWERS.items() if self.of_the_net else ():
             settling.learn(of, _LEARNT_FIRST, _moment(deadline, share))
         self._ask_formulas(settling, deadline, _FORMULA_SLICES_SECONDS)
-        settling.ask(_asked_of(DEADLOCK_FREE), (), _FIRST_LANES, deadline, _FIRST_SLICES_SECONDS)
+        if self.of_the_net:
+            settling.ask(_asked_of(DEADLOCK_FREE), (), _FIRST_LANES, deadline, _FIRST_SLICES_SECONDS)
 
     def _ask_formulas(
         self,
@@ -271,13 +275,14 @@ class _Check:
 
     def _report(self, space: StateSpace[Any], known: Mapping[str, Verdict] = MappingProxyType({})) -> CheckReport:
         """The report on a space; Ctrl-C leaves unknown what is not decided yet, and twice ends all."""
+        report = partial(report_on, space, self.queries, known, of_the_net=self.of_the_net)
         try:
-            return report_on(space, self.queries, known)
+            return report()
         except KeyboardInterrupt:
             if self.interrupted.is_set():
                 raise
             self.interrupted.set()
-            return _told(report_on(space, self.queries, known), [INTERRUPTED])
+            return _told(report(), [INTERRUPTED])
 
     def _explored(self, graph: ReachabilityGraph) -> CheckReport:
         """The report on a graph, and whether Ctrl-C ended the graph: then its figures are not those of the net."""

@@ -47,7 +47,8 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """The numbers and sets behind the verdicts, by the names of the net; None is unknown, as the budget ended.
+    """The numbers and sets behind the verdicts, by the names of the net; None is unknown, as the budget ended, or as
+    nobody asked for verdicts on the net itself.
 
     `deadlocks`, `doomed`, `home` and the values of `contacts` count markings. `nonserialisable` holds the steps of a
     step graph that no order replays; it is None for an interleaving graph, which has no steps. `cut_short` names the
@@ -58,21 +59,21 @@ class Figures:
     edges: int | None
     complete: bool
     bytes_per_marking: float | None
-    deadlocks: int | None
-    doomed: int | None
-    home: int | None
-    reversible: bool | None
-    live: bool | None
-    dead: tuple[str, ...] | None
-    nonlive: tuple[str, ...] | None
-    contacts: Mapping[str, int] | None
-    self_loops: tuple[str, ...]
-    firable_in_initial_marking: tuple[str, ...]
-    structural_conflicts: Pairs
-    effective_conflicts: Pairs | None
-    gate_races: tuple[tuple[str, str], ...]
-    cut_short: tuple[str, ...]
-    nonserialisable: tuple[tuple[str, ...], ...] | None
+    deadlocks: int | None = None
+    doomed: int | None = None
+    home: int | None = None
+    reversible: bool | None = None
+    live: bool | None = None
+    dead: tuple[str, ...] | None = None
+    nonlive: tuple[str, ...] | None = None
+    contacts: Mapping[str, int] | None = None
+    self_loops: tuple[str, ...] = ()
+    firable_in_initial_marking: tuple[str, ...] = ()
+    structural_conflicts: Pairs | None = None
+    effective_conflicts: Pairs | None = None
+    gate_races: tuple[tuple[str, str], ...] | None = None
+    cut_short: tuple[str, ...] = ()
+    nonserialisable: tuple[tuple[str, ...], ...] | None = None
 
     def to_json(self) -> dict[str, Any]:
         """The figures as JSON data; unknown ones are null."""
@@ -141,11 +142,16 @@ class CheckReport:
 
 
 def report_on(
-    space: StateSpace[Any], queries: Iterable[Query] = (), known: Mapping[str, Verdict] = MappingProxyType({})
+    space: StateSpace[Any],
+    queries: Iterable[Query] = (),
+    known: Mapping[str, Verdict] = MappingProxyType({}),
+    *,
+    of_the_net: bool = True,
 ) -> CheckReport:
     """Decide every verdict of this room, and the queries, on a state space that was explored before.
 
-    Of temporal properties and of queries the verdicts that are `known`, by name, are taken as they are.
+    Of temporal properties and of queries the verdicts that are `known`, by name, are taken as they are. The verdicts on
+    the net itself are left out, with their figures, where not `of_the_net`.
     """
     behaviour, conflicts = Behaviour(space), ConflictAnalysis(space)
     steps = _steps(space)
@@ -157,18 +163,22 @@ def report_on(
     def on_query(query: Query) -> Verdict:
         return known.get(f"query.{query.name}") or answer(space, query)
 
-    asks: list[Callable[[], Verdict]] = [
+    on_the_net: list[Callable[[], Verdict]] = [
         *(partial(decide, behaviour) for decide in _ON_BEHAVIOUR),
         partial(self_loop_free, space),
         *(partial(decide, conflicts) for decide in _ON_CONFLICTS),
         *([] if steps is None else [partial(conflict.steps_serialisable, steps)]),
         *(partial(decide, space) for decide in _ON_SPACE),
         partial(starvation_free, behaviour),
+    ]
+    asks: list[Callable[[], Verdict]] = [
+        *(on_the_net if of_the_net else ()),
         *(partial(on_property, of) for of in space.net.properties),
         *(partial(on_query, query) for query in queries),
     ]
     verdicts = _in_turn(space, asks)
-    return CheckReport(space.net, space.discipline, figures(behaviour, conflicts, steps), verdicts, space)
+    found = figures(behaviour, conflicts, steps) if of_the_net else Figures(**_size(space))
+    return CheckReport(space.net, space.discipline, found, verdicts, space)
 
 
 def _in_turn(space: StateSpace[Any], asks: Sequence[Callable[[], Verdict]]) -> tuple[Verdict, ...]:
@@ -235,9 +245,23 @@ def self_loop_free(space: StateSpace[Any]) -> Verdict:
     return question.ask(space, lambda: Answer(not found, found))
 
 
+def _size(space: StateSpace[Any]) -> dict[str, Any]:
+    """The figures that need no question."""
+    held = space.engine.bytes_per_marking if isinstance(space, ReachabilityGraph) else None
+    firable = Player(space.net).firable(space.net.initial_marking)
+    return {
+        "markings": space.n_markings,
+        "edges": space.n_edges,
+        "complete": space.complete,
+        "bytes_per_marking": held,
+        "self_loops": self_loops(space.net),
+        "firable_in_initial_marking": tuple(space.net.transitions[t].name for t in firable),
+    }
+
+
 def figures(behaviour: Behaviour[Any], conflicts: ConflictAnalysis[Any], steps: Steps | None) -> Figures:
     """The figures of a state space, each None where the budget ended before it was known."""
-    space, net = behaviour.space, behaviour.space.net
+    space = behaviour.space
     whole = space.complete
 
     def known(figure: Callable[[], T]) -> T | None:
@@ -248,12 +272,8 @@ def figures(behaviour: Behaviour[Any], conflicts: ConflictAnalysis[Any], steps: 
             return None
 
     nonlive = known(lambda: behaviour.nonlive)
-    firable = Player(net).firable(net.initial_marking)
     return Figures(
-        markings=space.n_markings,
-        edges=space.n_edges,
-        complete=whole,
-        bytes_per_marking=space.engine.bytes_per_marking if isinstance(space, ReachabilityGraph) else None,
+        **_size(space),
         deadlocks=known(lambda: space.count(space.deadlocks)) if whole else None,
         doomed=known(lambda: space.count(behaviour.doomed)),
         home=known(lambda: behaviour.home),
@@ -262,8 +282,6 @@ def figures(behaviour: Behaviour[Any], conflicts: ConflictAnalysis[Any], steps: 
         dead=known(lambda: behaviour.dead) if whole else None,
         nonlive=nonlive,
         contacts=known(lambda: MappingProxyType(behaviour.contacts)) if whole else None,
-        self_loops=self_loops(net),
-        firable_in_initial_marking=tuple(net.transitions[t].name for t in firable),
         structural_conflicts=conflicts.structural,
         effective_conflicts=known(lambda: conflicts.effective) if whole else None,
         gate_races=conflicts.races,

@@ -157,10 +157,13 @@ def answers(
     progress: Callable[[int, int], object] | None = None,
     interrupted: Event | None = None,
 ) -> Answered:
-    """Ask each family of a loop, with `progress` and `interrupted` of `check`; raises `InputError` as it does."""
+    """Ask each family of a loop, with `progress` and `interrupted` of `check`; raises `InputError` as it does.
+
+    Nothing else is asked of its net: whether a machine can be stopped, or every variant is live, is no question there.
+    """
     families = tuple(families)
-    properties = tuple(prop for family in families for prop in family.of.values())
-    report = check(replace(loop.net, properties=properties), budget=budget, progress=progress, interrupted=interrupted)
+    net = replace(loop.net, properties=tuple(prop for family in families for prop in family.of.values()))
+    report = check(net, budget=budget, of_the_net=False, progress=progress, interrupted=interrupted)
     return Answered(loop, families, (), report).doubting(())
 
 

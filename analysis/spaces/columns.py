@@ -97,7 +97,7 @@ def masks(rows: npt.NDArray[np.uint64]) -> list[int]:
     return [int.from_bytes(data[begin : begin + size], "little") for begin in range(0, len(data), size)]
 
 
-PART: Final = 1 << 16
+PART: Final = 1 << 18
 """So many markings make a part, on which terms are evaluated together."""
 
 

@@ -224,3 +224,18 @@ def test_what_the_explicit_engine_has_found_is_kept_where_its_budget_ends(monkey
         assert raced.verdict(name).status is Status.UNKNOWN
     told = next(line for line in raced.course if line.startswith("explored, and not all: "))
     assert "deadlock-free" in told
+
+
+@pytest.mark.parametrize("first_markings", [5, 200_000], ids=["raced", "explored"])
+def test_of_the_net_itself_nothing_is_asked_where_nobody_wants_to_know(
+    monkeypatch: pytest.MonkeyPatch, first_markings: int
+) -> None:
+    monkeypatch.setattr(module, "FIRST_MARKINGS", first_markings)
+    net = catalogue_net("one_robot")
+    whole, part = check(net), check(net, of_the_net=False)
+    assert {of.name for of in part.verdicts} == {f"property.{of.name}" for of in net.properties}
+    assert [(of.name, of.status) for of in part.verdicts] == [
+        (of.name, of.status) for of in whole.verdicts if of.name.startswith("property.")
+    ]
+    assert (part.figures.markings, part.figures.complete) == (whole.figures.markings, True)
+    assert (part.figures.live, part.figures.structural_conflicts) == (None, None)

@@ -53,6 +53,7 @@ def test_the_one_robot_cell_has_no_effective_conflict_and_the_late_variant_has_o
     safe, late = check(load_net("cell1")).figures, check(load_net("cell1_mc_late")).figures
     assert safe.effective_conflicts is not None
     assert late.effective_conflicts is not None
+    assert safe.structural_conflicts is not None
     assert safe.structural_conflicts.by_input == (("G2", "G6"),)
     assert safe.effective_conflicts.all == ()
     assert late.effective_conflicts.all == (("G2", "G6"),)
@@ -60,7 +61,9 @@ def test_the_one_robot_cell_has_no_effective_conflict_and_the_late_variant_has_o
 
 def test_the_two_robot_cells_have_no_conflict_even_structurally() -> None:
     for name in ("cell2_shared", "cell2_separate"):
-        assert check(load_net(name)).figures.structural_conflicts.all == ()
+        conflicts = check(load_net(name)).figures.structural_conflicts
+        assert conflicts is not None
+        assert conflicts.all == ()
 
 
 def test_the_capacity_place_restores_exactly_the_safe_markings() -> None:
@@ -145,7 +148,9 @@ class Expectation:
 
     def races(self, expected: list[list[str]]) -> None:
         # The reference writes a pair in the order of replay; `gate_races` writes t -> u where t closes a gate of u.
-        assert [[u, t] for t, u in self.report.figures.gate_races] == expected
+        races = self.report.figures.gate_races
+        assert races is not None
+        assert [[u, t] for t, u in races] == expected
 
     def nonserialisable(self, expected: list[list[str]]) -> None:
         assert [list(step) for step in self.step.figures.nonserialisable or ()] == expected

@@ -148,6 +148,7 @@ def test_conflicts_and_races_are_those_of_the_definitions(net: Net, discipline: 
         assert set(getattr(figures.structural_conflicts, attribute)) == {truth.names(list(p)) for p in structural}
         assert figures.effective_conflicts is not None
         assert set(getattr(figures.effective_conflicts, attribute)) == {truth.names(list(p)) for p in effective}
+    assert figures.gate_races is not None
     assert set(figures.gate_races) == {truth.names(list(pair)) for pair in gate_races(net)}
     if discipline is Discipline.INTERLEAVING:
         assert figures.nonserialisable is None
