@@ -83,11 +83,11 @@ def test_what_theorems_know_is_not_asked_again(monkeypatch: pytest.MonkeyPatch) 
 def test_an_interrupted_report_is_made_of_what_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[tuple[Any, ...]] = []
 
-    def interrupted(*arguments: Any) -> CheckReport:
+    def interrupted(*arguments: Any, **by: Any) -> CheckReport:
         calls.append(arguments)
         if len(calls) == 1:
             raise KeyboardInterrupt
-        return report_on(*arguments)
+        return report_on(*arguments, **by)
 
     monkeypatch.setattr("firable.analysis.check.report_on", interrupted)
     report = check(catalogue_net("one_robot"))
@@ -103,9 +103,13 @@ def test_what_an_interruption_leaves_unknown_is_no_matter_of_the_budget(
     def early(*of: Any, **by: Any) -> ReachabilityGraph:
         return ended(explore(*of, **by), reason)
 
-    def interrupted(*arguments: Any) -> CheckReport:
-        monkeypatch.setattr("firable.analysis.check.report_on", report_on)
-        raise KeyboardInterrupt
+    calls: list[int] = []
+
+    def interrupted(*of: Any, **by: Any) -> CheckReport:
+        calls.append(len(calls))
+        if len(calls) == 1:
+            raise KeyboardInterrupt
+        return report_on(*of, **by)
 
     monkeypatch.setattr("firable.analysis.check.explore", early)
     monkeypatch.setattr("firable.analysis.check.report_on", interrupted)
@@ -136,7 +140,7 @@ def test_ctrl_c_is_told_to_who_asks_of_other_nets_of_which_nothing_is_begun_then
 
 
 def test_interrupted_twice_ends_all(monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(*_: Any) -> CheckReport:
+    def interrupted(*_: Any, **__: Any) -> CheckReport:
         raise KeyboardInterrupt
 
     monkeypatch.setattr("firable.analysis.check.report_on", interrupted)

@@ -190,11 +190,11 @@ def test_what_was_decided_though_it_was_interrupted_is_asked_again(
     module = importlib.import_module("firable.analysis.check")
     report_on, calls = module.report_on, list[int]()
 
-    def interrupted(*of: Any) -> CheckReport:
+    def interrupted(*of: Any, **by: Any) -> CheckReport:
         calls.append(len(calls))
         if len(calls) == 1:
             raise KeyboardInterrupt
-        report: CheckReport = report_on(*of)
+        report: CheckReport = report_on(*of, **by)
         return report
 
     monkeypatch.setattr(module, "report_on", interrupted)
