@@ -43,6 +43,11 @@ def packed(column: Any) -> Any:
     return np.packbits(column) if np.ndim(column) else np.uint8(255 if column else 0)
 
 
+def restored(column: Any, n_markings: int) -> Column:
+    """The column of so many markings that was packed."""
+    return np.unpackbits(column, count=n_markings).astype(np.bool_)
+
+
 def unpacked(column: Any) -> Any:
     """The Booleans of a packed column, up to seven too many, or the one value of a scalar."""
     return np.unpackbits(column).astype(np.bool_) if np.ndim(column) else np.bool_(column)
@@ -101,14 +106,24 @@ PART: Final = 1 << 18
 """So many markings make a part, on which terms are evaluated together."""
 
 
+class Room:
+    """So many bytes for columns that are kept, because questions are many and of the same things."""
+
+    def __init__(self, size_bytes: int) -> None:
+        self._left = size_bytes
+
+    def holds(self, packed_column: Any) -> bool:
+        """Whether there is room for one more, which is taken."""
+        fits = bool(packed_column.nbytes <= self._left)
+        self._left -= packed_column.nbytes if fits else 0
+        return fits
+
+
 class Places:
-    """Which markings of a graph hold a place, packed, part by part.
+    """Which markings of a graph hold a place, packed, part by part; what was read once is kept where there is room."""
 
-    What was read once is kept, as far as `kept_bytes_max` goes: questions are many, and of the same places.
-    """
-
-    def __init__(self, rows: npt.NDArray[np.uint64], kept_bytes_max: int) -> None:
-        self._rows, self._left = rows, kept_bytes_max
+    def __init__(self, rows: npt.NDArray[np.uint64], room: Room) -> None:
+        self._rows, self._room = rows, room
         self._kept: dict[tuple[int, int], Any] = {}
 
     def reader(self, start: int) -> Callable[[int], Any]:
@@ -119,8 +134,7 @@ class Places:
         if (kept := self._kept.get((start, place))) is not None:
             return kept
         found = packed((self._rows[start : start + PART, place // 64] & np.uint64(1 << place % 64)) != 0)
-        if found.nbytes <= self._left:
-            self._left -= found.nbytes
+        if self._room.holds(found):
             self._kept[start, place] = found
         return found
 

@@ -8,7 +8,7 @@ Every witness is replayed by the reference player before anyone sees it. The eng
 a wrong path must become an internal error, never a counterexample that misleads an engineer.
 
 Columns are computed part by part, because a column of Booleans for each place of ten million markings takes more memory
-than the graph; those of places are kept packed as far as they fit, because questions are many and of the same places.
+than the graph. Those of places are kept, packed, as far as they fit: questions are many, and of the same places.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from firable.analysis.compiled import engine_limits, flat
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.spaces.space import Derived, Witnesses
 from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.formula import Formula, Or
 from firable.nets.net import Fairness, Marking, Net
 from firable.nets.verdict import Cost, Witness
 from firable.semantics.algebra import Bitwise, BooleanAlgebra
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-    from firable.analysis.spaces.columns import Column, Components, Places
+    from firable.analysis.spaces.columns import Column, Components, Places, Room
 
 __all__ = [
     "Budget",
@@ -46,7 +47,9 @@ __all__ = [
 ]
 
 _KEPT_SHARE: Final = 8
-"""The columns of places that are kept take at most this part of the memory that the exploration may take."""
+"""The columns that are kept take at most this part of the memory that the exploration may take."""
+_LARGE: Final = 8
+"""So many parts make a disjunction large."""
 _METHODS: Final = {
     Discipline.INTERLEAVING: "reachability graph, interleaving",
     Discipline.STEP: "reachability graph, synchronous steps",
@@ -175,10 +178,39 @@ class ReachabilityGraph(Derived["Column"]):
         return words_of(self.engine.markings_bytes(), self.engine.words)
 
     @cached_property
+    def _room(self) -> Room:
+        from firable.analysis.spaces.columns import Room
+
+        return Room(self.budget.memory_bytes // _KEPT_SHARE)
+
+    @cached_property
     def _places(self) -> Places:
         from firable.analysis.spaces.columns import Places
 
-        return Places(self._words, self.budget.memory_bytes // _KEPT_SHARE)
+        return Places(self._words, self._room)
+
+    @cached_property
+    def _satisfying(self) -> dict[Formula, Any]:
+        return {}
+
+    def satisfying(self, formula: Formula) -> Column:
+        """The markings in which a state formula holds.
+
+        Properties of a loop are disjunctions with what many of them share, that one of a hundred variants may fire: its
+        column is kept where there is room.
+        """
+        from firable.analysis.spaces.columns import packed, restored
+
+        if not isinstance(formula, Or) or not _is_large(formula):
+            return super().satisfying(formula)
+        if any(map(_is_large, formula.operands)):
+            return self.algebra.disjunction(map(self.satisfying, formula.operands))
+        if (kept := self._satisfying.get(formula)) is not None:
+            return restored(kept, self.n_markings)
+        found = super().satisfying(formula)
+        if self._room.holds(column := packed(found)):
+            self._satisfying[formula] = column
+        return found
 
     def where(self, term: Callable[[BooleanAlgebra[Any], Valuation[Any]], Any]) -> Column:
         """The value of a Boolean term at every marking; `term` gets the algebra and the reader of places.
@@ -344,6 +376,11 @@ class ReachabilityGraph(Derived["Column"]):
         """
         firings = [tuple(fired) for fired in self.engine.path_to(index)]  # what was found is shown, however late it is
         return self.witnesses.replayed(firings, self.marking(index), note)
+
+
+def _is_large(formula: Formula) -> bool:
+    """Whether it is a large disjunction, or one with such a part."""
+    return isinstance(formula, Or) and (len(formula.operands) >= _LARGE or any(map(_is_large, formula.operands)))
 
 
 def explore(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from unittest.mock import patch
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -12,7 +14,7 @@ from support.reference import load_net
 from support.ring_nets import ring_nets
 
 from firable.analysis.check import check
-from firable.analysis.spaces import columns
+from firable.analysis.spaces import columns, reachability
 from firable.analysis.spaces.columns import first
 from firable.analysis.spaces.reachability import Budget, IncompleteGraph, explore
 from firable.analysis.spaces.space import WitnessError
@@ -56,6 +58,22 @@ def test_columns_do_not_depend_on_the_size_of_their_chunks(monkeypatch: pytest.M
     whole = graph.satisfying(parse_formula("firable(G2) or deadlock"))
     monkeypatch.setattr(columns, "PART", 7)
     assert np.array_equal(graph.satisfying(parse_formula("firable(G2) or deadlock")), whole)
+
+
+@examples(50)
+@given(lively_nets(), st.sampled_from([8, 1 << 31, 1 << 32]), st.data())
+def test_columns_that_are_kept_are_those_that_are_computed_anew(net: Net, share: int, data: st.DataObject) -> None:
+    """Large disjunctions are, within others or alone, and places are, where there is room; it makes no difference."""
+    graph = explore(net)
+    with patch.object(reachability, "_KEPT_SHARE", share):
+        assert graph.count(graph.marked(0)) == sum(graph.marking(i) & 1 for i in range(graph.n_markings))
+    atoms = [*(f"firable({t.name})" for t in net.transitions), *(place.name for place in net.places)]
+    for _ in range(4):
+        large, small = (data.draw(st.lists(st.sampled_from(atoms), min_size=n, max_size=9)) for n in (8, 1))
+        for text in (" or ".join(large), f"not ({' or '.join(small)}) or ({' or '.join(large)})"):
+            formula = parse_formula(text)
+            found = [evaluate(BOOL, net, formula, holds_in(graph.marking(i))) for i in range(graph.n_markings)]
+            assert [graph.satisfying(formula).tolist() for _ in range(2)] == [found, found]
 
 
 def test_columns_reach_over_more_than_64_places() -> None:
