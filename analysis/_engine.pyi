@@ -80,8 +80,8 @@ def explore(
 class Graph:
     """A reachability graph. Markings are stored, edges are computed again when they are asked for.
 
-    From the second question on that goes against them (`backward`) edges are kept, turned round, where
-    `max_memory_bytes` has room for them.
+    Once questions that go against them (`backward`) have tried more than it takes to store them, edges are kept, turned
+    round, where `max_memory_bytes` has room for them.
     """
 
     @property

@@ -15,7 +15,7 @@ use firable_engine::bottoms::Bottoms;
 use firable_engine::budget::{Watch, unwatched};
 use firable_engine::csr::Csr;
 use firable_engine::explore::{Limits, Space};
-use firable_engine::fixpoints::{backward, endless};
+use firable_engine::fixpoints::{Against, backward, endless};
 use firable_engine::net::{Net, Transition};
 
 /// Dining philosophers of four places: fork, thinking, holding the left fork, eating.
@@ -100,7 +100,7 @@ fn main() {
             "explore" | "two" => {}
             "bottoms" => drop(Bottoms::new(&space, &mut watch).expect("fits")),
             "edges" => drop(Csr::new(&space, None, &space.memory.clone(), &mut watch).expect("fits")),
-            "backward" => drop(backward(&space, &initial, None, None, None, &mut watch).expect("fits")),
+            "backward" => drop(backward(&space, &initial, None, None, &Against::default(), &mut watch).expect("fits")),
             "endless" => drop(endless(&space, Some(&initial), &mut watch).expect("fits")),
             other => panic!("no work {other}"),
         }

@@ -28,6 +28,8 @@ pub struct Fan<'a> {
     found: Vec<u32>,
     /// The same, where they have keys.
     asking: Box<Asking>,
+    /// How many candidates the table was asked for.
+    pub tried: u64,
 }
 
 impl<'a> Fan<'a> {
@@ -53,6 +55,7 @@ impl<'a> Fan<'a> {
             edges: Vec::new(),
             found: Vec::new(),
             asking: Box::new(Asking::new()),
+            tried: 0,
         })
     }
 
@@ -133,6 +136,7 @@ impl<'a> Fan<'a> {
                 self.found.as_slice()
             }
         };
+        self.tried += self.edges.len() as u64;
         let mut done = 0;
         for (&(j, t), &found) in self.edges.iter().zip(found) {
             if found != NONE && visit(usize::from(j), t, found) {

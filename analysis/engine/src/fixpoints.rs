@@ -2,9 +2,10 @@
 //!
 //! Under interleaving no edge is stored for one question. The rule runs backwards from 64 markings at a time (`Fan`), and
 //! what waits is taken in the order of the indexes (`Agenda`), so a search against the edges costs about what the
-//! exploration did; more where many transitions differ only in what they ask before, as those of a cell with its machines
-//! do, because most of what they come from was never reached. So from the second question on the edges are stored, turned
-//! round, where the budget of memory has room for them (`against`): a search then costs some ten nanoseconds an edge.
+//! exploration did; fifty times as much where many transitions differ only in what they ask before, as those of a cell with
+//! its machines do, because most of what they come from was never reached. So who asks again and again counts what was
+//! tried, and stores the edges, turned round, before that comes to more (`Against`): a search then costs some ten
+//! nanoseconds an edge.
 //!
 //! One step back is asked from whichever side is smaller: the predecessors of few targets are computed, and of many, each
 //! marking looks for one edge into them, of which it usually finds one at once.
@@ -15,6 +16,9 @@
 //!
 //! Under steps, where the rule has no simple reverse, edges are stored for each question.
 
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use crate::bits::{Agenda, Bits};
 use crate::budget::{Stop, Watch};
 use crate::csr::Csr;
@@ -24,23 +28,52 @@ use crate::fan::Fan;
 use crate::marking::Width;
 use crate::with_width;
 
-/// All edges of a graph, turned round, to be kept: their bytes count as held by the graph.
-pub fn against(space: &Space, watch: &mut Watch<'_>) -> Result<Csr, Stop> {
-    let memory = space.memory.clone();
-    let edges = Csr::new(space, None, &memory, watch)?.reversed(&memory, watch)?;
-    space.memory.claim(edges.bytes())?;
-    Ok(edges)
+/// The edges of a graph turned round, once they are worth what it takes to store them.
+#[derive(Debug, Default)]
+pub struct Against {
+    /// How many candidates for a predecessor the table was asked for.
+    tried: AtomicU64,
+    /// The edges; none where they do not fit.
+    edges: OnceLock<Option<Csr>>,
 }
 
+impl Against {
+    /// The edges, if they are stored.
+    pub fn stored(&self) -> Option<&Csr> {
+        self.edges.get().and_then(Option::as_ref)
+    }
+
+    /// The edges, if they are worth it and there is room: their bytes count as held by the graph.
+    fn edges(&self, space: &Space, watch: &mut Watch<'_>) -> Result<Option<&Csr>, Stop> {
+        let worth = space.step || self.tried.load(Ordering::Relaxed) > WORTH * space.edges;
+        if worth && self.edges.get().is_none() {
+            let memory = space.memory.clone();
+            let stored = Csr::new(space, None, &memory, watch).and_then(|edges| edges.reversed(&memory, watch));
+            let stored = match stored.and_then(|edges| space.memory.claim(edges.bytes()).map(|()| edges)) {
+                Err(Stop::Memory) => None,
+                edges => Some(edges?),
+            };
+            if let Err(Some(second)) = self.edges.set(stored) {
+                // Somebody has done the same meanwhile.
+                space.memory.release(second.bytes());
+            }
+        }
+        Ok(self.stored())
+    }
+}
+
+/// As many candidates for each edge of the graph are tried at most before edges are stored, which costs as much as some
+/// three.
+const WORTH: u64 = 6;
+
 /// The markings from which a target can be reached, one byte each, targets included; every marking on the way before
-/// the target is in `within`; with `by`, by edges that fire one of these transitions. `against` are all edges turned
-/// round, where they are stored.
+/// the target is in `within`; with `by`, by edges that fire one of these transitions.
 pub fn backward(
     space: &Space,
     targets: &[u8],
     within: Option<&[u8]>,
     by: Option<&[u32]>,
-    against: Option<&Csr>,
+    against: &Against,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<u8>, Stop> {
     let memory = space.memory.clone();
@@ -52,13 +85,13 @@ pub fn backward(
         !reach.has(source as usize) && within.is_none_or(|within| within[source as usize] != 0)
     };
     let mut taken = Vec::with_capacity(64);
-    let against = against.filter(|_| by.is_none());
+    let stored = if by.is_none() { against.edges(space, watch)? } else { None };
     let own = match by {
-        _ if !space.step || against.is_some() => None,
+        _ if !space.step || stored.is_some() => None,
         None => Some(Csr::new(space, None, &memory, watch)?.reversed(&memory, watch)?),
         Some(_) => Some(Csr::of_steps(space, one_of(space, by), &memory, watch)?.reversed(&memory, watch)?),
     };
-    if let Some(edges) = against.or(own.as_ref()) {
+    if let Some(edges) = stored.or(own.as_ref()) {
         while agenda.take(&mut taken) {
             for &index in &taken {
                 let sources = edges.targets(index);
@@ -89,6 +122,7 @@ pub fn backward(
                 watch.tick(taken.len() + edges + transitions.len())?;
             }
         });
+        against.tried.fetch_add(fan.tried, Ordering::Relaxed);
     }
     Ok(reach.to_bytes(space.len()))
 }
@@ -112,17 +146,17 @@ fn one_of(space: &Space, by: Option<&[u32]>) -> impl Fn(Fired<'_>) -> bool {
 }
 
 /// The markings with an edge into the targets, one byte each; with `by`, an edge that fires one of these transitions.
-/// `against` as in `backward`.
+/// Edges that `backward` has stored are used.
 pub fn before(
     space: &Space,
     targets: &[u8],
     by: Option<&[u32]>,
-    against: Option<&Csr>,
+    against: &Against,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<u8>, Stop> {
     let memory = space.memory.clone();
     let mut found = memory.filled(0u8, space.len())?;
-    if let Some(edges) = against.filter(|_| by.is_none()) {
+    if let Some(edges) = against.stored().filter(|_| by.is_none()) {
         for target in (0..space.len() as u32).filter(|&target| targets[target as usize] != 0) {
             edges.targets(target).iter().for_each(|&source| found[source as usize] = 1);
             watch.tick(1 + edges.targets(target).len())?;

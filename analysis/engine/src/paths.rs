@@ -159,7 +159,15 @@ mod tests {
             assert_eq!(path_between(&space, two, &targets, Some(&within), &mut watch), Ok(None));
             let mut start = vec![0; 4];
             start[0] = 1;
-            let reach = crate::fixpoints::backward(&space, &start, None, None, None, &mut watch).expect("fits");
+            let reach = crate::fixpoints::backward(
+                &space,
+                &start,
+                None,
+                None,
+                &crate::fixpoints::Against::default(),
+                &mut watch,
+            )
+            .expect("fits");
             assert_eq!((reach.iter().map(|&b| u32::from(b)).sum::<u32>(), reach[dead as usize]), (3, 0));
         }
     }

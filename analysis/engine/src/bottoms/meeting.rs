@@ -141,7 +141,7 @@ fn meets<W: Width>(
 mod tests {
     use super::*;
     use crate::budget::unwatched;
-    use crate::fixpoints::backward;
+    use crate::fixpoints::{Against, backward};
     use crate::samples::random_spaces;
     use crate::with_width;
 
@@ -153,7 +153,7 @@ mod tests {
             let mut watch = Watch::new(None, &mut poll);
             let mut initial = vec![0; space.len()];
             initial[0] = 1;
-            let expected = backward(&space, &initial, None, None, None, &mut watch).expect("fits");
+            let expected = backward(&space, &initial, None, None, &Against::default(), &mut watch).expect("fits");
             let last = space.len() as u32 - 1;
             with_width!(space.net.words, width => {
                 let found = returning(width, &space, space.len() / 2, &mut watch).expect("in time");

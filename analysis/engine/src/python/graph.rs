@@ -1,6 +1,5 @@
 //! `Graph`: a reachability graph, its figures, and the questions that are asked of it.
 
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use pyo3::exceptions::{PyIndexError, PyValueError};
@@ -15,6 +14,7 @@ use crate::csr::Csr;
 use crate::edges::Edges;
 use crate::explore::Space;
 use crate::fairness::Fairness;
+use crate::fixpoints::Against;
 use crate::scc::Scc;
 use crate::table::NONE;
 use crate::{fairness, fixpoints, paths};
@@ -25,9 +25,7 @@ pub(crate) struct Graph {
     space: Space,
     scc: OnceLock<Arc<Scc>>,
     bottoms: OnceLock<Bottoms>,
-    /// The edges turned round, from the second question on that goes against them; none where they do not fit.
-    against: OnceLock<Option<Csr>>,
-    asked_against: AtomicBool,
+    against: Against,
     /// Bytes held when the exploration ended.
     explored_bytes: usize,
 }
@@ -42,14 +40,7 @@ enum Markings<'py> {
 impl Graph {
     pub(crate) fn new(space: Space) -> Self {
         let explored_bytes = space.memory.used();
-        Graph {
-            space,
-            scc: OnceLock::new(),
-            bottoms: OnceLock::new(),
-            against: OnceLock::new(),
-            asked_against: AtomicBool::new(false),
-            explored_bytes,
-        }
+        Graph { space, scc: OnceLock::new(), bottoms: OnceLock::new(), against: Against::default(), explored_bytes }
     }
 
     fn long<T: Send>(
@@ -114,24 +105,6 @@ impl Graph {
         }
         let bottoms = self.long(py, patience, Bottoms::new)?;
         Ok(self.bottoms.get_or_init(|| bottoms))
-    }
-
-    fn against(&self, py: Python<'_>, patience: &Patience) -> PyResult<Option<&Csr>> {
-        if !self.asked_against.swap(true, Ordering::Relaxed) {
-            return Ok(None);
-        }
-        if let Some(known) = self.against.get() {
-            return Ok(known.as_ref());
-        }
-        let edges = self.long(py, patience, |space, watch| match fixpoints::against(space, watch) {
-            Err(Stop::Memory) => Ok(None),
-            edges => edges.map(Some),
-        })?;
-        if let Err(Some(second)) = self.against.set(edges) {
-            // Somebody has done the same meanwhile.
-            self.space.memory.release(second.bytes());
-        }
-        Ok(self.against.get().and_then(Option::as_ref))
     }
 
     fn scc(&self, py: Python<'_>, patience: &Patience) -> PyResult<Arc<Scc>> {
@@ -309,9 +282,8 @@ impl Graph {
         let targets = self.bitmap(targets)?;
         let within = within.map(|within| self.bitmap(within)).transpose()?;
         let by = by.map(|by| self.check_transitions(by)).transpose()?;
-        let against = if by.is_none() { self.against(py, &patience)? } else { None };
         let reach = self.long(py, &patience, |space, watch| {
-            fixpoints::backward(space, &targets, within.as_deref(), by.as_deref(), against, watch)
+            fixpoints::backward(space, &targets, within.as_deref(), by.as_deref(), &self.against, watch)
         })?;
         Ok(PyBytes::new(py, &reach))
     }
@@ -417,9 +389,9 @@ impl Graph {
         self.whole("what leads to a set of markings")?;
         let targets = self.bitmap(targets)?;
         let by = by.map(|by| self.check_transitions(by)).transpose()?;
-        let against = if by.is_none() { self.against.get().and_then(Option::as_ref) } else { None };
-        let found =
-            self.long(py, &patience, |space, watch| fixpoints::before(space, &targets, by.as_deref(), against, watch))?;
+        let found = self.long(py, &patience, |space, watch| {
+            fixpoints::before(space, &targets, by.as_deref(), &self.against, watch)
+        })?;
         Ok(PyBytes::new(py, &found))
     }
 
