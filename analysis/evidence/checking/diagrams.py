@@ -58,7 +58,7 @@ class Diagrams(Nodes):
     def _read(self, of: Diagram) -> list[int]:
         numbers = [EMPTY, UNIT]
         for level, lo, hi in of.rows:
-            below = max(lo, hi) < len(numbers) and min(lo, hi) >= 0 and 1 <= level <= len(self.level_of)
+            below = max(lo, hi) < len(numbers) and min(lo, hi) >= 0 and level <= len(self.level_of)
             if not below or max(self.levels[numbers[lo]], self.levels[numbers[hi]]) >= level:
                 refuse("a row of the diagram does not stand above its parts")
             numbers.append(self.node(level, numbers[lo], numbers[hi]))
