@@ -1,14 +1,16 @@
 """A document of evidence that is sealed anew is refused where it has another shape, or names what is none."""
 
+import gzip
 import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
 from support.evidence import document
 from support.evidence_examples import EXAMPLES
 
-from firable.analysis.evidence.document import document_from_text, seal
+from firable.analysis.evidence.document import document_from_text, read_document, seal
 from firable.nets.diagnostics import InputError
 
 Change = Callable[[dict[str, Any]], object]
@@ -107,3 +109,49 @@ def test_a_key_that_stands_twice_is_refused() -> None:
     assert text.count('"depth":0') == 1
     with pytest.raises(InputError, match="a key stands twice"):
         document_from_text(text.replace('"depth":0', '"depth":1,"depth":0'))
+
+
+def test_a_value_that_is_none_of_json_is_not_taken_for_nothing() -> None:
+    found = EXAMPLES["reduced to nothing"]()
+    assert found is not None
+    text = document(found).to_text()
+    assert '"then":null' in text
+    with pytest.raises(InputError, match="NaN is no value of JSON"):
+        document_from_text(text.replace('"then":null', '"then":NaN', 1))
+
+
+def _without_its_check(packed: bytes) -> bytes:
+    return packed[:-8] + bytes(8)
+
+
+@pytest.mark.parametrize(
+    ("damage", "reason"),
+    [
+        (lambda packed: packed + b"beside", "not to its end"),
+        (lambda packed: packed + gzip.compress(b"and more"), "not to its end"),
+        (lambda packed: packed[:-9], "not to its end"),
+        (_without_its_check, "it cannot be unpacked: "),
+    ],
+)
+def test_what_is_compressed_is_one_document_whole(
+    damage: Callable[[bytes], bytes], reason: str, tmp_path: Path
+) -> None:
+    found = EXAMPLES["invariant"]()
+    assert found is not None
+    file, packed = tmp_path / "packed.json.gz", gzip.compress(document(found).to_text().encode())
+    file.write_bytes(packed)
+    assert read_document(file).records == document(found).records
+    file.write_bytes(damage(packed))
+    with pytest.raises(InputError, match=reason):
+        read_document(file)
+
+
+def test_a_document_that_unpacks_to_too_much_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = EXAMPLES["invariant"]()
+    assert found is not None
+    file, text = tmp_path / "packed.json.gz", document(found).to_text().encode()
+    file.write_bytes(gzip.compress(text + b" " * 10_000))
+    assert read_document(file).records == document(found).records
+    monkeypatch.setattr("firable.analysis.evidence.document.SIZE_BYTES_MAX", len(text))
+    with pytest.raises(InputError, match="it unpacks to too much"):
+        read_document(file)

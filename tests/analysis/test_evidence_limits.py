@@ -256,6 +256,15 @@ def test_steps_of_a_large_set_are_refused_where_they_make_none(
         document_from_text(json.dumps({**data, "seal": seal(data)}))
 
 
+def test_the_first_of_a_large_set_may_be_the_marking_without_tokens(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(claim_records, "APART_MAX", 0)
+    net = Net("taken", (Place("a", marked=True), Place("z")), (Transition("take", ("a",)),))
+    of = Labelling(Markings((0, 1)))
+    document = Document(net, Discipline.INTERLEAVING, (Record("", True, ((Claim(ClaimKind.NEVER, Holds("z")), of),)),))
+    assert '"ascending","markings":["0","1"]' in document.to_text()
+    assert document_from_text(document.to_text()) == document
+
+
 def test_a_net_of_many_parts_fires_all_its_transitions_in_few_runs() -> None:
     net = family_net("machines-300")
     names = [transition.name for transition in net.transitions]
