@@ -178,7 +178,7 @@ def read_document(path: str | Path) -> Document:
             data = unpacker.decompress(data, SIZE_BYTES_MAX)
         except zlib.error as error:
             raise _damaged(file, f"it cannot be unpacked: {error}") from None
-        if unpacker.unconsumed_tail or not unpacker.eof or unpacker.unused_data:
+        if not unpacker.eof or unpacker.unused_data:
             raise _damaged(file, "it unpacks to too much, or not to its end")
     try:
         text = data.decode("utf-8")
