@@ -35,16 +35,14 @@ class ClaimRecord(Data):
     """A claim; what a kind of claim does not speak of is left out."""
 
     kind: Annotated[ClaimKind, Field(strict=False)]  # not strict: an enumeration is a string here
-    goal: str = ""
+    goal: str
     then: str = ""
     fairness: Annotated[Fairness, Field(strict=False)] = Fairness.NONE
     fires: list[str] = []
 
     def of(self, net: Net) -> Claim:
         """The claim, its names looked up."""
-        goal: Temporal = TRUE
-        if self.goal:
-            goal = parse_formula(self.goal) if self.kind in STATE_GOALS else parse_temporal(self.goal)
+        goal: Temporal = parse_formula(self.goal) if self.kind in STATE_GOALS else parse_temporal(self.goal)
         if self.kind not in STATE_GOALS:
             wanted = Logic.CTL if self.kind is ClaimKind.CTL else Logic.LTL
             if wanted not in logics(goal):

@@ -20,6 +20,10 @@ def of_claim(**changed: Any) -> Change:
     return lambda data: data["verdicts"][0]["shown"][0]["claim"].update(changed)
 
 
+def without_goal(data: dict[str, Any]) -> None:
+    del data["verdicts"][0]["shown"][0]["claim"]["goal"]
+
+
 def of_certificate(**changed: Any) -> Change:
     return lambda data: data["verdicts"][0]["shown"][0]["certificate"].update(changed)
 
@@ -38,6 +42,8 @@ CHANGES: dict[str, tuple[str, Change, str]] = {
     "a transition that fires": ("fires", of_claim(fires=["nobody"]), "no 'nobody'"),
     "a formula of CTL for one of LTL": ("unfolded", of_claim(goal="AG EF done"), "is no formula of LTL"),
     "a formula of LTL for one of CTL": ("labels", of_claim(goal="G F deadlock"), "is no formula of CTL"),
+    "the goal of a claim": ("markings", without_goal, "claim.goal: Field required"),
+    "no goal": ("markings", of_claim(goal=""), "a formula cannot be read: the formula ends too early"),
     "a formula for a goal": ("markings", of_claim(goal="AG deadlock"), "a formula cannot be read"),
     "a place of a sum": ("invariant", of_certificate(equations=[SUM]), "no 'nowhere'"),
     "a place of a lower bound": ("invariant", of_certificate(inequalities=[SUM]), "no 'nowhere'"),
