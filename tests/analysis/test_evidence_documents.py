@@ -33,6 +33,8 @@ def of_set(**changed: Any) -> Change:
 
 
 SUM = {"weights": {"nowhere": 1}, "tokens": 0}
+LARGE = {"weights": {}, "tokens": 10**4_000}
+LOW = {"weights": {"p1.eating": -(10**4_000)}, "tokens": 0}
 STEP = {"rule": "copy", "moves": [], "places": ["nowhere", "nowhere"]}
 DIAGRAM = {"kind": "diagram", "order": ["a", "b", "asked", "done"], "rows": [], "roots": [1]}
 CHANGES: dict[str, tuple[str, Change, str]] = {
@@ -46,6 +48,8 @@ CHANGES: dict[str, tuple[str, Change, str]] = {
     "no goal": ("markings", of_claim(goal=""), "a formula cannot be read: the formula ends too early"),
     "a formula for a goal": ("markings", of_claim(goal="AG deadlock"), "a formula cannot be read"),
     "a place of a sum": ("invariant", of_certificate(equations=[SUM]), "no 'nowhere'"),
+    "a number of a sum": ("invariant", of_certificate(equations=[LARGE]), "has more than 4,000 digits"),
+    "a number of a weight": ("invariant", of_certificate(inequalities=[LOW]), "has more than 4,000 digits"),
     "a place of a lower bound": ("invariant", of_certificate(inequalities=[SUM]), "no 'nowhere'"),
     "a place of a clause": (
         "invariant",
@@ -73,6 +77,11 @@ CHANGES: dict[str, tuple[str, Change, str]] = {
     "who is stubborn": (
         "stubborn sets",
         of_certificate(stubborn=["1" + "0" * 40]),
+        "a transition that the net does not",
+    ),
+    "who is stubborn beside others": (
+        "stubborn sets",
+        of_certificate(stubborn=["1", "1" + "0" * 40]),
         "a transition that the net does not",
     ),
     "a set": ("markings", of_certificate(set=1), "no set 1"),
