@@ -58,6 +58,7 @@ from firable.semantics.trace import Discipline
 
 FORK = net("fork", "a", ("a", "b"), ("a", "c"))
 BACKWARDS = net("backwards", "b", ("b", "a"))
+OVER = net("over", "a", ("b", "a"))
 HALF_LIVE = net("half", "a", ("a", "b"), ("b", "a"), ("a", "c"))
 
 
@@ -100,6 +101,11 @@ LABELS: dict[str, Callable[[], Evidence]] = {
     "always is left": lambda: listed(LOOP, "AG a", ["a", "b"], 0, -1),
     "another one than M0 has a rank": lambda: listed(ENDING, "EG b", ["a", "b"], -1, 0),
     "M0 has no rank": lambda: listed(LOOP, "EF z", ["a", "b"], -1, -1),
+    "nothing is next": lambda: listed(OVER, "EX a", ["a"]),
+    "one of two is not next": lambda: listed(LOOP, "EX b and EX z", ["a", "b"]),
+    "who would fire is never opened": lambda: listed(SHUT, "EF b", ["a", "b"], 1, 0),
+    "one way goes round before the end": lambda: listed(HALF_LIVE, "AF c", ["a", "b", "c"], 1, 2, 0),
+    "always is left on one way": lambda: listed(HALF_LIVE, "AG not c", ["a", "b", "c"], 0, 0, -1),
     "a label too few": lambda: listed(LOOP, "EF z", ["a", "b"]),
     "a rank too few": lambda: listed(LOOP, "EF z", ["a", "b"], 0),
     "a diagram leaves M0 out": lambda: of_loop(Whole(), "AG b", "b", ENDING),
@@ -214,6 +220,10 @@ def test_two_markings_with_one_hash_get_others(monkeypatch: pytest.MonkeyPatch) 
         listed(ENDING, "not E[not a U b]", ["a", "b"], 0, -1),  # an always that is over
         listed(ENDING, "not A[not a U b]", ["a", "b"], 0, -1),
         listed(LOOP, "EX b and AX b", ["a", "b"]),
+        listed(LOOP, "EX b or EX z", ["a", "b"]),
+        listed(OVER, "AX b", ["a"]),
+        listed(FORK, "EX b", ["a", "b", "c"]),
+        listed(FORK, "EF b", ["a", "b", "c"], 1, 0, -1),
     ],
     ids=str,
 )
@@ -314,7 +324,7 @@ def unanswered(of: Net, fairness: Fairness, firings: str, cycle: str = "") -> Ev
 
 
 _BOTH = (ExternalGate("s", wanted=True), ExternalGate("s", wanted=False))
-SHUT = Net(
+SHUT: Net = Net(
     "shut",
     (Place("a", marked=True), Place("b")),
     (Transition("t0", ("a",), ("b",), external=_BOTH), Transition("t1", ("b",), ("a",))),
