@@ -102,8 +102,7 @@ class Part:
         return [(t, self._column(where)) for t, where in found if where]
 
     def _column(self, number: int) -> Column:
-        size = len(self.markings)
-        return [digit == "1" for digit in reversed(f"{number:0{size}b}")] if size else []
+        return [digit == "1" for digit in reversed(f"{number:0{len(self.markings)}b}")]
 
     def where(self, formula: Formula) -> Column:
         """The markings in which a state formula holds."""
