@@ -95,6 +95,7 @@ LABELS: dict[str, Callable[[], Evidence]] = {
     "the way is not through": lambda: listed(LOOP, "E[z U b]", ["a", "b"], 1, 0),
     "one next marking has no rank": lambda: listed(FORK, "AF b", ["a", "b", "c"], 1, 0, -1),
     "until every next ends in a deadlock": lambda: listed(ENDING, "AF (a and b)", ["a", "b"], 2, 1),
+    "a deadlock has a rank": lambda: listed(ENDING, "AF (a and b)", ["a", "b", "ab"], 2, 1, 0),
     "a deadlock is not the end": lambda: listed(ENDING, "AF (a and b)", ["a", "b"], 1, 0),
     "it ends with the next": lambda: listed(LOOP, "EG a", ["a", "b"], 0, -1),
     "it does not hold throughout": lambda: listed(LOOP, "EG a", ["a", "b"], 0, 0),
@@ -105,7 +106,10 @@ LABELS: dict[str, Callable[[], Evidence]] = {
     "one of two is not next": lambda: listed(LOOP, "EX b and EX z", ["a", "b"]),
     "who would fire is never opened": lambda: listed(SHUT, "EF b", ["a", "b"], 1, 0),
     "one way goes round before the end": lambda: listed(HALF_LIVE, "AF c", ["a", "b", "c"], 1, 2, 0),
-    "always is left on one way": lambda: listed(HALF_LIVE, "AG not c", ["a", "b", "c"], 0, 0, -1),
+    "always is left on the first way": lambda: listed(FORK, "AG not b", ["a", "b", "c"], 0, -1, 0),
+    "always is left on the last way": lambda: listed(FORK, "AG not c", ["a", "b", "c"], 0, 0, -1),
+    "the first next does not hold": lambda: listed(FORK, "AX c", ["a", "b", "c"]),
+    "the last next does not hold": lambda: listed(FORK, "AX b", ["a", "b", "c"]),
     "a label too few": lambda: listed(LOOP, "EF z", ["a", "b"]),
     "a rank too few": lambda: listed(LOOP, "EF z", ["a", "b"], 0),
     "a diagram leaves M0 out": lambda: of_loop(Whole(), "AG b", "b", ENDING),
@@ -138,6 +142,20 @@ def test_a_rank_beyond_the_number_of_markings_is_refused(rank: int, monkeypatch:
     monkeypatch.setattr("firable.analysis.evidence.checking.checker.EDGES_MAX", 0)
     with pytest.raises(InputError, match="does not show what it claims"):
         check_evidence(listed(LOOP, "EF z", ["a", "b"], rank, rank - 1))
+    with pytest.raises(InputError, match="no rank is as large as the number of markings"):
+        check_evidence(listed(LOOP, "EF b", ["a", "b"], rank, 0))
+
+
+@pytest.mark.parametrize("place", [0, 7, 8, 15, 16, 19])
+def test_a_large_set_is_looked_through_to_its_end(place: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("firable.analysis.evidence.checking.checker.EDGES_MAX", 0)
+    monkeypatch.setattr("firable.analysis.evidence.checking.closed._CHUNK", 8)
+    letters = "abcdefghijklmnopqrst"
+    of = net("round", "a", *zip(letters, letters[1:] + "a", strict=True))
+    space = Markings(tuple(1 << i for i in range(20)))
+    assert check_evidence(never(of, f"{letters[place]} and {letters[place - 1]}", space)).shown
+    with pytest.raises(InputError, match="holds in a marking of the set"):
+        check_evidence(never(of, letters[place], space))
 
 
 @pytest.mark.parametrize("markings", [(2, 1), (1, 1, 2)])
