@@ -246,7 +246,9 @@ def test_the_certifier_takes_few_markings_of_a_small_net_before_a_diagram_of_all
     assert isinstance(found.then.space, Markings)
 
 
-@given(st.integers(0, 9).flatmap(lambda width: st.tuples(st.just(width), st.lists(st.integers(0, 2**width - 1)))))
+@given(
+    st.integers(0, 9).flatmap(lambda width: st.tuples(st.just(width), st.lists(st.integers(0, 2 ** (width + 1) - 1))))
+)
 def test_columns_are_the_rows_turned(matrix: tuple[int, list[int]]) -> None:
     width, rows = matrix
     turned = [[i for i, row in enumerate(rows) if row >> k & 1] for k in range(width)]
