@@ -19,6 +19,7 @@ from support.true_claims import true
 from support.whole_nets import formulas
 
 from firable.analysis.evidence.certificate import (
+    Certificate,
     Clause,
     Diagram,
     Equation,
@@ -379,6 +380,21 @@ def test_a_kind_of_evidence_shows_its_kind_of_claim_only() -> None:
     claim = Claim(ClaimKind.REACHABLE, Start())
     assert refuses(Evidence(net, Discipline.INTERLEAVING, claim, InductiveInvariant()))
     assert not refuses(Evidence(net, Discipline.INTERLEAVING, claim, FiringSequence(())))
+
+
+@pytest.mark.parametrize(
+    ("claim", "right", "wrong"),
+    [
+        (ClaimKind.REACHABLE, FiringSequence((("t0",),)), FiringSequence((("t0",), ("t1",)))),
+        (ClaimKind.REACHABLE, FiringSequence((("t0",),)), FiringSequence((("t0",),), (("t1",), ("t0",)))),
+        (ClaimKind.NEVER, Labelling(Markings((1, 2))), Labelling(Markings((1, 2)), (Whole(), Whole()))),
+        (ClaimKind.NEVER, Labelling(A_OR_B), Labelling(A_OR_B, (Whole(), Whole()))),
+    ],
+)
+def test_no_evidence_says_more_than_is_looked_at(claim: ClaimKind, right: Certificate, wrong: Certificate) -> None:
+    goal = Holds("b" if claim is ClaimKind.REACHABLE else "z")
+    assert not refuses(Evidence(LOOP, Discipline.INTERLEAVING, Claim(claim, goal), right))
+    assert refuses(Evidence(LOOP, Discipline.INTERLEAVING, Claim(claim, goal), wrong))
 
 
 def test_evidence_of_interleaving_shows_nothing_of_steps() -> None:

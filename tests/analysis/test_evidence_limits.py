@@ -2,11 +2,13 @@
 
 import json
 import random
+from collections.abc import Callable
 from dataclasses import replace
+from itertools import count
 from typing import Any
 
 import pytest
-from support.evidence_examples import EXAMPLES, LOOP, RACING
+from support.evidence_examples import CIRCUIT, EXAMPLES, LOOP, RACING
 
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
 from firable.analysis.check import check
@@ -24,9 +26,11 @@ from firable.analysis.evidence.certificate import (
     Reduction,
     Rule,
     Step,
+    Theorem,
+    TheoremName,
     Unfolded,
 )
-from firable.analysis.evidence.checking.checker import check_document, check_evidence
+from firable.analysis.evidence.checking.checker import Checked, check_document, check_evidence
 from firable.analysis.evidence.checking.obligation import Evidence, TimedTerms
 from firable.analysis.evidence.checking.obligations import diagram_term, obligations, played
 from firable.analysis.evidence.claims import Claim, ClaimKind
@@ -42,13 +46,13 @@ from firable.analysis.evidence.producing.runs import runs_by_search, runs_on_gra
 from firable.analysis.evidence.read_off import eager_cycle
 from firable.analysis.evidence.refusal import TimeIsOverError
 from firable.analysis.goal import Limits
-from firable.analysis.induction.smt import Term
+from firable.analysis.induction.smt import Answer, Decision, Term, decide
 from firable.analysis.spaces.reachability import REASONS, Budget, ReachabilityGraph, explore
 from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.nets.catalogue import catalogue_net
 from firable.nets.catalogue.families import family_net
 from firable.nets.diagnostics import InputError
-from firable.nets.formula import And, Holds
+from firable.nets.formula import And, Holds, Or
 from firable.nets.net import Command, ExternalGate, Net, Place, Signal, Transition
 from firable.nets.queries import parse_query
 from firable.nets.temporal import parse_temporal
@@ -152,6 +156,59 @@ def test_another_certificate_of_a_claim_that_was_shown_is_looked_at() -> None:
     assert next(checked).shown
     with pytest.raises(InputError, match="F6002"):
         next(checked)
+
+
+@pytest.mark.parametrize("edges_max", [100_000, 0])
+def test_each_claim_is_looked_at_on_the_markings_of_its_own(edges_max: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("firable.analysis.evidence.checking.checker.EDGES_MAX", edges_max)
+    sets = (Markings((1, 2)), Markings((2,)))
+    claims = (Claim(ClaimKind.NEVER, And((Holds("a"), Holds(name)))) for name in ("b", "z"))
+    shown = tuple((claim, Labelling(markings)) for claim, markings in zip(claims, sets, strict=True))
+    with pytest.raises(InputError, match="the initial marking is not in the set"):
+        list(check_document(Document(LOOP, Discipline.INTERLEAVING, (Record("", True, shown),))))
+
+
+OF_PARTS = Evidence(
+    LOOP,
+    Discipline.INTERLEAVING,
+    Claim(ClaimKind.NEVER, Or((Holds("z"), And((Holds("a"), Holds("b")))))),
+    Labelling(Diagram(("a", "b", "z"), ((1, 0, 1), (2, 2, 1)), (3,))),
+)
+ONE_EACH = InductiveInvariant((Equation((("a", 1), ("b", 1)), 1), Equation((("c", 1), ("d", 1)), 1)))
+BY_SUMS = Evidence(
+    CIRCUIT, Discipline.INTERLEAVING, Claim(ClaimKind.LIVE), Theorem(TheoremName.MARKED_GRAPH, contact=ONE_EACH)
+)
+SOLVED: dict[str, Callable[[], Evidence | None]] = {
+    "a diagram": lambda: OF_PARTS,
+    "a theorem on sums": lambda: BY_SUMS,
+    **{name: EXAMPLES[name] for name in ("invariant", "traps", "reduction", "reduced to a part")},
+    **{name: EXAMPLES[name] for name in ("free choice", "free choice by ranks")},
+}
+
+
+@pytest.mark.parametrize("name", SOLVED)
+def test_what_the_solver_gives_up_is_not_shown(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    found, questions = SOLVED[name](), count()
+    assert found is not None
+
+    def checked(given_up: int) -> Checked:
+        asked = count()
+
+        def answer(*of: Any, **limits: Any) -> Decision:
+            next(questions)
+            return Decision(Answer.UNKNOWN, reason="why not") if next(asked) == given_up else decide(*of, **limits)
+
+        monkeypatch.setattr("firable.analysis.evidence.checking.checker.decide", answer)
+        return check_evidence(found)
+
+    assert checked(-1).shown
+    asked_in_all = next(questions)
+    assert asked_in_all
+    for given_up in range(asked_in_all):
+        told = checked(given_up)
+        assert told.shown is None
+        assert "z3 gave up" in told.bound
+        assert told.bound.endswith("why not")
 
 
 def test_claims_of_no_verdict_may_stand_beside_each_other() -> None:

@@ -6,10 +6,11 @@ import pytest
 from support.evidence_examples import ENDING, SOMETIMES, TURNS
 from support.true_claims import true
 
-from firable.analysis.evidence.certificate import Markings, Progress
-from firable.analysis.evidence.checking.checker import check_evidence
+from firable.analysis.evidence.certificate import Labelling, Markings, Progress
+from firable.analysis.evidence.checking.checker import check_document, check_evidence
 from firable.analysis.evidence.checking.obligation import Evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind
+from firable.analysis.evidence.document import Document, Record
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import parse_formula
 from firable.nets.net import Fairness, Net, Place, Transition
@@ -80,6 +81,17 @@ def test_ranks_that_say_what_they_must_are_taken() -> None:
     for evidence in TIGHT:
         assert true(evidence)
         assert check_evidence(evidence).shown
+
+
+def test_ranks_are_looked_at_one_by_one_where_other_claims_are_in_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("firable.analysis.evidence.checking.checker.EDGES_MAX", 0)
+    for evidence in TIGHT:
+        assert isinstance(evidence.certificate, Progress)
+        both = (Claim(ClaimKind.NEVER, parse_formula("a and b")), Labelling(evidence.certificate.space))
+        shown = (both, (evidence.claim, evidence.certificate))
+        (checked,) = check_document(Document(evidence.net, evidence.discipline, (Record("", True, shown),)))
+        assert checked.shown
+        assert [" in columns" in method for method in checked.methods] == [True, False]
 
 
 @pytest.mark.parametrize("name", LOOSE)

@@ -198,3 +198,16 @@ def test_a_part_that_serves_a_formula_shows_nothing_that_wants_a_closed_set() ->
     assert [one.shown for one in check_document(document)] == [True]
     with pytest.raises(InputError, match="leads out of the set"):
         list(check_document(Document(NET, Discipline.INTERLEAVING, (Record("", True, shown),))))
+
+
+def test_each_formula_is_unfolded_on_the_markings_of_its_own() -> None:
+    first, second = (Claim(ClaimKind.LTL, parse_temporal(text)) for text in ("p", "G (p or q)"))
+    start, after = NET.marking("p"), NET.marking("q")
+
+    def told(of_second: Markings) -> list[bool]:
+        shown = ((first, Unfolded(Markings((start,)))), (second, Unfolded(of_second)))
+        return [one.shown for one in check_document(Document(NET, Discipline.INTERLEAVING, (Record("", True, shown),)))]
+
+    assert told(Markings((start, after))) == [True]
+    with pytest.raises(InputError, match="the initial marking is not in the set"):
+        told(Markings((after,)))
