@@ -209,8 +209,8 @@ class Reduction:
     """The net becomes smaller by the steps, and then falls apart; in one part the goal is never met.
 
     `part` names its places. `goal` speaks of them, and follows from the goal of the net wherever the net, with what the
-    steps say of its places, meets it; `then` shows that it is never met. Where the goal is false after the steps, both
-    are missing.
+    steps say of its places, meets it; `then` shows that it is never met. Where the goal is false after the steps, all
+    three are missing.
     """
 
     steps: tuple[Step, ...]

@@ -311,6 +311,16 @@ def test_what_is_said_of_a_net_that_nothing_is_left_of_is_looked_at() -> None:
         check_evidence(replace(found, certificate=replace(found.certificate, goal=parse_formula("true"), then=wrong)))
 
 
+def test_of_a_net_that_nothing_is_left_of_nothing_is_said() -> None:
+    of = family_net("philosophers-2")
+    claim = Claim(ClaimKind.NEVER, parse_formula("p1.eating and not p1.eating"))
+    evidence = Evidence(of, Discipline.INTERLEAVING, claim, Reduction(()))
+    assert check_evidence(evidence).shown
+    for said in (Reduction((), part=("p1.eating",)), Reduction((), goal=parse_formula("nowhere"))):
+        with pytest.raises(InputError, match="nothing shows anything of it"):
+            check_evidence(replace(evidence, certificate=said))
+
+
 @pytest.mark.parametrize("name", ["reduction", "reduced to nothing", "reduced to a part"])
 def test_a_reduction_with_a_step_left_out_or_at_another_place_shows_nothing_false(name: str) -> None:
     found = EXAMPLES[name]()

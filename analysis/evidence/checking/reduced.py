@@ -54,6 +54,8 @@ def left_of(evidence: Evidence, deadline: Deadline) -> Left:
     size = f"{len(net.places)}/{len(net.transitions)} to {len(draft.values)}/{len(draft.moves)} places/transitions"
     words = f"{len(of.steps):,} steps of a reduction from {size} gone through"
     if of.then is None:
+        if of.part or of.goal != Constant(value=False):
+            refuse("a part of the net is named, or its goal, and nothing shows anything of it")
         if draft.deadlock and draft.never_dead:
             return Left((), None, words)
         nothing = Obligation("goal", "after the steps of the reduction the goal is false", (draft.goal,))
