@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.dense_nets import PLACES, dense_nets
 from support.evidence import certified, document
-from support.evidence_examples import ENDING, EXAMPLES, LOOP, induced
+from support.evidence_examples import ENDING, EXAMPLES, LOOP, induced, net
 from support.examples import examples
 from support.second_solver import by_cvc5
 from support.true_claims import true
@@ -45,7 +45,7 @@ from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.nets.catalogue import catalogue_net
 from firable.nets.catalogue.families import family_net
 from firable.nets.diagnostics import InputError
-from firable.nets.formula import And, Firable, Formula, Holds, Not, Start, parse_formula
+from firable.nets.formula import And, Constant, Firable, Formula, Holds, Not, Start, parse_formula
 from firable.nets.interchange import net_digest, net_from_json
 from firable.nets.net import Fairness, Net, Place, Transition
 from firable.semantics.trace import Discipline
@@ -276,6 +276,27 @@ def test_transitions_that_fire_are_in_order_each_once(example: Evidence, fires: 
     assert refuses(sealed(data))
 
 
+@pytest.mark.parametrize(
+    ("name", "names"),
+    [
+        ("invariant", ["goal"]),
+        ("traps", ["initial", "step", "goal"]),
+        ("distances", ["initial", "step"]),
+        ("diagram", ["initial", "step", "goal"]),
+        ("reduction", ["weaker", "initial", "step", "goal"]),
+        ("reduced to nothing", []),
+        ("continuation", ["initial", "step", "goal"]),
+        ("marked graph", ["initial", "step", "goal"]),
+        ("free choice", ["initial", "step", "goal", "siphons"]),
+        ("stubborn sets", []),
+    ],
+)
+def test_a_second_solver_is_given_each_obligation(name: str, names: list[str]) -> None:
+    found = EXAMPLES[name]()
+    assert found is not None
+    assert [obligation.name for obligation in obligations(found)] == names
+
+
 def test_every_obligation_is_discharged_by_a_second_solver(example: Evidence) -> None:
     texts = [obligation.text(example) for obligation in obligations(example)]
     assert {by_cvc5(text) for text in [*texts, *filter(None, [sums_text(example)])]} <= {"unsat"}
@@ -405,6 +426,58 @@ def test_evidence_of_interleaving_shows_nothing_of_steps() -> None:
     assert found is not None
     assert not refuses(found)
     assert refuses(replace(found, discipline=Discipline.STEP))
+
+
+def test_evidence_of_steps_shows_nothing_of_interleaving() -> None:
+    pair = net("pair", "ac", ("a", "b"), ("c", "d"))  # in a step both fire
+    sums = tuple(Equation(tuple((name, 1) for name in names), 1) for names in ("ab", "cd"))
+    together = Clause(marked=("d",), empty=("b",)), Clause(marked=("b",), empty=("d",))
+    claim = Claim(ClaimKind.NEVER, parse_formula("b and c"))
+    found = Evidence(pair, Discipline.STEP, claim, InductiveInvariant(sums, together))
+    assert true(found)
+    assert not refuses(found)
+    assert not true(replace(found, discipline=Discipline.INTERLEAVING))
+    assert refuses(replace(found, discipline=Discipline.INTERLEAVING))
+
+
+LOOPING = replace(LOOP, transitions=(*LOOP.transitions, Transition("never", ("a",), ("a", "z"))))
+
+
+@pytest.mark.parametrize(
+    "invariant",
+    [
+        InductiveInvariant(clauses=(Clause(empty=("z",)),)),
+        InductiveInvariant((Equation((("z", 1),), 0),)),  # who never fires changes no sum
+        InductiveInvariant((Equation((("a", 0), ("z", 2)), 0),)),
+        InductiveInvariant(inequalities=(Inequality((("z", -1),), 0),)),
+        InductiveInvariant(inequalities=(Inequality((("a", 1), ("b", 1), ("z", -4)), -1),)),  # M0 has more than that
+    ],
+)
+def test_an_invariant_shows_what_it_excludes(invariant: InductiveInvariant) -> None:
+    found = Evidence(LOOPING, Discipline.INTERLEAVING, Claim(ClaimKind.NEVER, parse_formula("z and a")), invariant)
+    assert not refuses(found)
+    assert {by_cvc5(text) for text in (*(one.text(found) for one in obligations(found)), sums_text(found)) if text} == {
+        "unsat"
+    }
+    assert refuses(replace(found, claim=Claim(ClaimKind.NEVER, Holds("b"))))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        InductiveInvariant((Equation((("z", 1),), -1),)),
+        InductiveInvariant((Equation((("a", 1), ("b", -1)), 1),)),
+        InductiveInvariant((Equation((("a", -1), ("b", 1)), -1),)),
+        InductiveInvariant(inequalities=(Inequality((("a", -1),), 0),)),
+        InductiveInvariant(inequalities=(Inequality((("a", 1), ("b", -1)), 1),)),
+    ],
+)
+def test_a_sum_that_is_wrong_is_so_to_a_second_solver_too(wrong: InductiveInvariant) -> None:
+    found = Evidence(LOOPING, Discipline.INTERLEAVING, Claim(ClaimKind.NEVER, Constant(value=False)), wrong)
+    text = sums_text(found)
+    assert text is not None
+    assert by_cvc5(text) == "sat"
+    assert refuses(found)
 
 
 def test_a_deeper_induction_is_checked_with_its_base() -> None:
