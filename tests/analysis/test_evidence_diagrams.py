@@ -1,19 +1,38 @@
 """Each condition on a decision diagram is needed: a false claim for each, on a diagram that breaks this one alone."""
 
+import random
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import pytest
 from support.evidence_examples import LOOP, net
+from support.examples import seeds
+from support.lively_nets import lively_net
 from support.true_claims import true
 
 from firable.analysis.evidence.certificate import Back, Diagram, Label, Labelling, Ranks, Root, Rounds, Whole
 from firable.analysis.evidence.checking.checker import check_evidence
+from firable.analysis.evidence.checking.labelling import Least, fixpoints, normal
 from firable.analysis.evidence.checking.obligation import Evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.nets.diagnostics import InputError
-from firable.nets.formula import parse_formula
-from firable.nets.net import ExternalGate, Net, Signal, Transition
-from firable.nets.temporal import parse_temporal
+from firable.nets.formula import Compare, Count, Deadlock, Firable, Holds, Sign, Start, parse_formula
+from firable.nets.net import ExternalGate, Marking, Net, Signal, Transition
+from firable.nets.temporal import (
+    Eventually,
+    Exists,
+    ForAll,
+    Globally,
+    Next,
+    Temporal,
+    Until,
+    all_of,
+    any_of,
+    format_temporal,
+    negated,
+    parse_temporal,
+)
+from firable.semantics.player import Player
 from firable.semantics.trace import Discipline
 
 FORK = net("fork", "a", ("a", "b"), ("a", "c"))
@@ -34,20 +53,25 @@ UNFIRED = Net(  # `shut` is never opened, `stuck` never firable
 )
 
 
-def diagram(order: str, *sets: str) -> Diagram:
-    """The diagram of sets of markings, "a bc" being the two of a alone and of b and c, in the order of the levels."""
+def drawn(order: Sequence[str], *sets: Iterable[Iterable[str]]) -> Diagram:
+    """The diagram of sets of markings, each with the places that hold a token in it; the first place has level 1."""
     rows: dict[tuple[int, int, int], int] = {}
 
-    def number(markings: frozenset[str], level: int) -> int:
+    def number(markings: frozenset[frozenset[str]], level: int) -> int:
         if not level or not markings:
             return len(markings)
         name = order[level - 1]
         lo = number(frozenset(one for one in markings if name not in one), level - 1)
-        hi = number(frozenset(one.replace(name, "") for one in markings if name in one), level - 1)
+        hi = number(frozenset(one - {name} for one in markings if name in one), level - 1)
         return rows.setdefault((level, lo, hi), len(rows) + 2) if hi else lo
 
-    roots = tuple(number(frozenset(markings.split()), len(order)) for markings in sets)
+    roots = tuple(number(frozenset(map(frozenset, markings)), len(order)) for markings in sets)
     return Diagram(tuple(order), tuple(rows), roots)
+
+
+def diagram(order: str, *sets: str) -> Diagram:
+    """The same in letters: "a bc" are the marking with a token on a alone, and that with tokens on b and c."""
+    return drawn(order, *map(str.split, sets))
 
 
 def labelled(of: Net, text: str, space: Diagram, *labels: Label) -> Evidence:
@@ -139,3 +163,58 @@ def test_a_true_claim_is_refused_whose_diagram_has(name: str) -> None:
 def test_a_row_of_a_diagram_stands_above_parts_that_there_are(rows: tuple[tuple[int, int, int], ...]) -> None:
     with pytest.raises(InputError, match="does not stand above its parts"):
         check_evidence(never(LOOP, "a and b", replace(OF_LOOP, rows=rows, roots=(1 + len(rows),))))
+
+
+def closed(of: Net, markings: Iterable[Marking]) -> set[Marking]:
+    """These markings, and all that are reached from them."""
+    player, found = Player(of), set(markings)
+    todo = list(found)
+    while todo:
+        after = {marking for _, marking in player.successors(todo.pop())} - found
+        found |= after
+        todo += after
+    return found
+
+
+def a_formula(chance: random.Random, of: Net, depth: int = 2) -> Temporal:
+    """Some formula of CTL."""
+
+    def part() -> Temporal:
+        return a_formula(chance, of, depth - 1)
+
+    if not depth or chance.random() < 0.3:
+        places = [place.name for place in of.places]
+        some = Count(tuple(chance.choice(places) for _ in range(2)))
+        firable = Firable(chance.choice(of.transitions).name) if of.transitions else Deadlock()
+        compared = Compare(some, chance.choice(list(Sign)), Count(added=chance.randrange(3)))
+        return chance.choice((Holds(chance.choice(places)), firable, Deadlock(), Start(), compared))
+    path = chance.choice((Until(part(), part()), *(kind(part()) for kind in (Next, Eventually, Globally))))
+    quantified = chance.choice((Exists, ForAll))(path)
+    return chance.choice((quantified, quantified, negated(part()), all_of((part(), part())), any_of((part(), part()))))
+
+
+@pytest.mark.seeds
+@pytest.mark.parametrize("seed", seeds(10))
+def test_no_diagram_shows_a_claim_that_is_false(seed: int) -> None:
+    chance = random.Random(seed)
+    for _ in range(10):
+        of = lively_net(chance, most_places=6)
+        order, names = [place.name for place in of.places], [transition.name for transition in of.transitions]
+        chance.shuffle(order)
+        for _ in range(5):
+            more = chance.sample(range(2 ** len(order)), chance.randrange(3))
+            whole = closed(of, {of.initial_marking, *more}) - {chance.randrange(2 ** len(order))}
+            part = {marking for marking in whole if chance.random() < 0.7}
+            formula = parse_temporal(format_temporal(a_formula(chance, of)))
+            labels: list[Label] = []
+            for one in fixpoints(normal(formula)):
+                ways = tuple(chance.choice(names) for _ in range(chance.randrange(5) if names else 0))
+                until = Rounds(chance.randrange(4)) if one.every else Back(ways)
+                labels.append(until if isinstance(one, Least) else chance.choice((Whole(), Root(1))))
+            space = drawn(order, map(of.names, whole), map(of.names, part))
+            evidence = labelled(of, format_temporal(formula), space, *labels)
+            try:
+                shown = check_evidence(evidence).shown
+            except InputError:
+                continue
+            assert not shown or true(evidence), evidence
