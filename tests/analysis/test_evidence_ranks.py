@@ -1,6 +1,7 @@
 """Ranks of a response are tight: one that says more than it must is refused, though the response is there."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import pytest
 from support.evidence_examples import ENDING, SOMETIMES, TURNS
@@ -28,7 +29,32 @@ TWICE = Net(  # the answer comes in two steps, the second one by either of two t
 )
 
 
-def response(of: Net, fairness: Fairness, asked: str, ranks: Iterable[str], *helpful: str) -> Evidence:
+EITHER = Net(  # the answer comes at any time, and by another transition, which stands first, only now and then
+    "either",
+    SOMETIMES.places,
+    (*SOMETIMES.transitions[:3], Transition("go", ("asked",), ("done",)), SOMETIMES.transitions[3]),
+)
+NESTED = Net(  # `now` is enabled in c only, to which `leave` leads from a only, and of a and b each leads to the other
+    "nested",
+    (Place("a", marked=True), Place("b"), Place("c"), Place("asked", marked=True), Place("done")),
+    (
+        *TURNS.transitions[:2],
+        Transition("leave", ("a",), ("c",)),
+        Transition("back", ("c",), ("a",)),
+        Transition("now", ("asked",), ("done",), permissive=("c",)),
+    ),
+)
+ASTRAY = replace(NESTED, transitions=(*NESTED.transitions[:2], Transition("in", ("c",), ("a",)), NESTED.transitions[4]))
+CHAIN = Net(  # who comes from a waits in b, where something fires at all times and changes nothing
+    "chain",
+    (Place("a", marked=True), Place("b"), Place("asked"), Place("done")),
+    (Transition("on", ("a",), ("b",)), Transition("end", ("b",), ("done",)), Transition("idle")),
+)
+
+
+def response(
+    of: Net, fairness: Fairness, asked: str, ranks: Iterable[str], *helpful: str, then: str = "done"
+) -> Evidence:
     """Ranks of markings, "a asked: 0 1" being one, and who helps, "0: go" being one."""
     rank_of = {
         of.marking(names.split()): numbers.split() for names, _, numbers in (one.partition(":") for one in ranks)
@@ -39,18 +65,26 @@ def response(of: Net, fairness: Fairness, asked: str, ranks: Iterable[str], *hel
         tuple(tuple(map(int, rank_of[marking])) for marking in sorted(rank_of)),
         tuple((tuple(map(int, numbers)), name) for numbers, name in helping),
     )
-    then = parse_formula("b" if of is ENDING else "done")
-    claim = Claim(ClaimKind.LEADS_TO, parse_formula(asked), then, fairness)
+    claim = Claim(ClaimKind.LEADS_TO, parse_formula(asked), parse_formula(then), fairness)
     return Evidence(of, Discipline.INTERLEAVING, claim, certificate)
 
 
 def once(*ranks: str, helpful: str = "", asked: str = "a") -> Evidence:
-    return response(ENDING, Fairness.WEAK, asked, ranks, *filter(None, [helpful]))
+    return response(ENDING, Fairness.WEAK, asked, ranks, *filter(None, [helpful]), then="b")
 
 
 def twice(*helpful: str) -> Evidence:
     ranks = ("a asked: 1", "b asked: 1", "a half: 0", "b half: 0", "a done:", "b done:")
     return response(TWICE, Fairness.WEAK, "asked", ranks, *helpful)
+
+
+def either(helpful: str) -> Evidence:
+    return response(EITHER, Fairness.WEAK, "asked", ("a asked: 0", "b asked: 0", "a done:", "b done:"), helpful)
+
+
+def nested(of: Net, *ranks: str, helpful: tuple[str, ...] = ("0: now", "0 0: leave")) -> Evidence:
+    answered = ("a done:", "b done:", "c done:")
+    return response(of, Fairness.STRONG, "asked", ("c asked: 0", *ranks, *answered), *helpful)
 
 
 def sometimes(*ranks: str) -> Evidence:
@@ -62,11 +96,19 @@ TIGHT = [
     once("a:", "b:", asked="b"),
     twice("0: by", "1: go"),
     sometimes("a asked: 0 0", "b asked: 0"),
+    either("0: go"),
+    nested(NESTED, "a asked: 0 0", "b asked: 0 0 0"),
+    response(CHAIN, Fairness.WEAK, "asked", ("a:", "b:", "done:")),
 ]
 LOOSE = {
     "what is answered has a rank": once("a: 0", "b: 0"),
     "what is not asked has a rank": once("a: 0", "b:", asked="b"),
+    "what another one leads to, and nobody asks for, has a rank": response(
+        CHAIN, Fairness.WEAK, "asked", ("a:", "b: 0", "done:"), "0: end"
+    ),
     "there is a gap": once("a: 1", "b:"),
+    "there is a gap further on": nested(NESTED, "a asked: 0 0", "b asked: 0 0 1"),
+    "who helps is not always enabled": either("0: now"),
     "a rank is too long": once("a: 0 0", "b:"),
     "a rank is too short": sometimes("a asked: 0", "b asked: 0"),
     "nobody has to help": once("a: 0", "b:", helpful="0: end"),
@@ -92,6 +134,24 @@ def test_ranks_are_looked_at_one_by_one_where_other_claims_are_in_columns(monkey
         (checked,) = check_document(Document(evidence.net, evidence.discipline, (Record("", True, shown),)))
         assert checked.shown
         assert [" in columns" in method for method in checked.methods] == [True, False]
+
+
+FALSE = {
+    "nobody helps where the wait goes round": nested(ASTRAY, "a asked: 0 0", "b asked: 0 0", helpful=("0: now",)),
+    "what comes next waits no more": response(ENDING, Fairness.NONE, "a", ("a: 0", "b:"), then="a and b"),
+}
+
+
+@pytest.mark.parametrize("name", FALSE)
+def test_ranks_of_a_response_that_does_not_come_are_refused(name: str) -> None:
+    assert not true(FALSE[name])
+    with pytest.raises(InputError, match="a firing comes no nearer to the answer"):
+        check_evidence(FALSE[name])
+
+
+def test_who_is_not_enabled_all_the_time_does_not_help_under_weak_fairness() -> None:
+    with pytest.raises(InputError, match=r"now is to help in \{a, asked\}, where it is not enabled"):
+        check_evidence(either("0: now"))
 
 
 @pytest.mark.parametrize("name", LOOSE)
