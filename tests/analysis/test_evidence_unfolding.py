@@ -96,6 +96,21 @@ def test_the_tableau_refuses_a_run_iff_it_does_not_satisfy_the_formula(run: Lass
     assert satisfied(run, formula) is run.values(formula)[0]
 
 
+@pytest.mark.parametrize(
+    ("letters", "text"),
+    [
+        ([1, 2, 2], "not G F p"),  # only all three together are a part in which the until is not put off for ever
+        ([2, 2, 1, 2], "not G F p"),
+        ([9], "not G ((p U X s) and X (p U X s))"),  # what is put off owes less, and must not stand for what is met
+        ([9, 1], "not G ((p U X s) and X (p U X s))"),
+    ],
+)
+def test_a_run_that_refutes_a_formula_is_found(letters: list[int], text: str) -> None:
+    run, formula = lasso([(letter, "t") for letter in letters], 0), parse_temporal(text)
+    assert not run.values(formula)[0]
+    assert not satisfied(run, formula)
+
+
 @pytest.mark.parametrize("text", NESTED)
 def test_nested_operators_are_unfolded_right_with_few_looks_at_the_deadline(text: str) -> None:
     formula = parse_temporal(text)
