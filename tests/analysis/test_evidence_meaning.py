@@ -31,7 +31,7 @@ from firable.analysis.report import report_on
 from firable.nets.catalogue import catalogue_net
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Or, Start, parse_formula
-from firable.nets.net import Command, ExternalGate, Net, Place, Property, PropertyKind, Signal, Transition
+from firable.nets.net import Command, ExternalGate, Net, Place, Property, PropertyKind, Signal, SignalKind, Transition
 from firable.nets.queries import Query, QueryKind, query_named
 from firable.nets.temporal import parse_temporal
 from firable.nets.verdict import Status
@@ -376,3 +376,18 @@ def test_one_run_that_shows_both_commands_to_be_followed_is_claimed_once(of: Net
     (shown,) = (one for one in check_document(found) if one.record.name == "machine-never-stopped")
     assert shown.record.proved
     assert shown.shown
+
+
+def test_two_places_that_wait_for_one_signal_share_a_completion() -> None:
+    ended = (ExternalGate("done"),)
+    ways = (Transition("t", ("a",), ("x",), external=ended), Transition("u", ("b",), ("y",), external=ended))
+    waiting = tuple(Place(name, command=Command("m", "run"), completion="done") for name in "ab")
+    places = (*waiting, Place("x"), Place("y"))
+    of = Net("shared", places, ways, (Signal("done", kind=SignalKind.COMPLETION),))
+    once = replace(of, places=(places[0], Place("b"), *places[2:]))
+    asked = partial(suffices, name="shared-completions", query=None, discipline=Discipline.INTERLEAVING)
+    assert not asked(of, proved=True, claims=[])
+    assert not asked(of, proved=True, claims=never("a"))
+    assert asked(of, proved=True, claims=never("a and b"))
+    assert asked(of, proved=False, claims=reachable("a and b"))
+    assert asked(once, proved=True, claims=[])
