@@ -57,8 +57,8 @@ from firable.semantics.trace import Discipline
 
 def contact(net: Net, *, openable: bool = False) -> Formula:
     """Some transition is in contact, of all or of those whose external gates can be opened."""
-    of = [t for t in net.transitions if set(t.outputs) - set(t.inputs) and (t.openable or not openable)]
-    return tidy(Or(tuple(map(in_contact_formula, of)))) if of else Constant(value=False)
+    of = (t for t in net.transitions if set(t.outputs) - set(t.inputs) and (t.openable or not openable))
+    return tidy(Or(tuple(map(in_contact_formula, of))))
 
 
 def in_contact_formula(t: Transition) -> Formula:
@@ -106,8 +106,7 @@ def _together(pairs: Iterable[tuple[str, str]]) -> Formula:
 
 
 def _some(parts: Iterable[Formula]) -> Formula:
-    found = tuple(parts)
-    return tidy(Or(found)) if found else Constant(value=False)
+    return tidy(Or(tuple(parts)))
 
 
 def senders(net: Net) -> dict[str, dict[str, tuple[str, ...]]]:
