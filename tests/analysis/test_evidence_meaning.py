@@ -33,7 +33,7 @@ from firable.nets.diagnostics import InputError
 from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Or, Start, parse_formula
 from firable.nets.net import Command, ExternalGate, Net, Place, Property, PropertyKind, Signal, SignalKind, Transition
 from firable.nets.queries import Query, QueryKind, query_named
-from firable.nets.temporal import parse_temporal
+from firable.nets.temporal import format_temporal, parse_temporal
 from firable.nets.verdict import Status
 from firable.semantics.trace import Discipline
 
@@ -391,3 +391,68 @@ def test_two_places_that_wait_for_one_signal_share_a_completion() -> None:
     assert asked(of, proved=True, claims=never("a and b"))
     assert asked(of, proved=False, claims=reachable("a and b"))
     assert asked(once, proved=True, claims=[])
+
+
+AT_A, AT_B = (tidy(is_marking(LOOP, LOOP.marking(name))) for name in "ab")
+ASKED = replace(
+    LOOP,
+    properties=(
+        Property("answered", PropertyKind.LEADS_TO, Holds("a"), Holds("b")),
+        Property("possible", PropertyKind.ALWAYS_POSSIBLE, Holds("b")),
+    ),
+)
+ANSWERED = Claim(ClaimKind.LEADS_TO, Holds("a"), Holds("b"))
+
+
+@pytest.mark.parametrize(
+    ("name", "proved", "claims"),
+    [
+        # These fire nothing, and meet nothing: no kind of claim but theirs speaks of what is beside the goal.
+        ("quasi-live", True, [Claim(ClaimKind.REACHABLE, TRUE, fires=("t0", "t1"))]),
+        ("live", True, [Claim(ClaimKind.ALWAYS_POSSIBLE, AT_B, fires=("t0", "t1"))]),
+        (
+            "property.possible",
+            True,
+            [Claim(ClaimKind.ALWAYS_POSSIBLE, AT_A), Claim(ClaimKind.REACHABLE, AT_A, then=Holds("b"))],
+        ),
+        ("home-markings", False, reachable("a", "not a")),
+        ("starvation", False, []),  # nobody waits
+        ("property.answered", True, [Claim(ClaimKind.NOT_LEADS_TO, Holds("a"), Holds("b"))]),
+        ("property.answered", False, [ANSWERED]),
+        ("property.other", True, [ANSWERED]),
+        ("property.other", False, []),
+        ("property.", True, []),
+        ("answered", True, [ANSWERED]),
+    ],
+)
+def test_claims_of_something_else_do_not_suffice(name: str, proved: bool, claims: list[Claim]) -> None:
+    assert not suffices(ASKED, Discipline.INTERLEAVING, name, proved, claims, None)
+
+
+def test_a_net_without_transitions_has_a_deadlock() -> None:
+    still = Net("still", (Place("a", marked=True),), ())
+    asked = partial(suffices, still, Discipline.INTERLEAVING, "deadlock-free", query=None)
+    assert not asked(proved=True, claims=[])
+    assert asked(proved=False, claims=reachable("deadlock"))
+
+
+def test_a_net_is_one_safe_where_no_openable_transition_is_in_contact() -> None:
+    query, both = Query("q", QueryKind.ONE_SAFE), (ExternalGate("s", wanted=True), ExternalGate("s", wanted=False))
+    of = Net(
+        "touching",
+        (Place("a", marked=True), Place("b", marked=True), Place("c")),
+        (Transition("t", ("a",), ("b",)), Transition("shut", ("c",), ("a",), external=both)),
+        (Signal("s"),),
+    )
+    asked = partial(suffices, of, Discipline.INTERLEAVING, "query.q", query=query)
+    assert not asked(proved=True, claims=[])
+    assert not asked(proved=True, claims=never("a and c"))
+    assert asked(proved=True, claims=never("a and b"))
+    assert asked(proved=False, claims=reachable("a and b"))
+
+
+def test_each_of_those_that_send_a_command_is_beside_none_that_sends_another() -> None:
+    one, other = "(fires(t) or fires(v))", "(fires(u) or fires(w))"
+    asked = format_temporal(never_beside(("t", "v"), ("u", "w")))
+    assert asked == f"G (not {one} or X G not {other}) and G (not {other} or X G not {one})"
+    assert never_beside(("t",), ()) == never_beside((), ("u",)) == TRUE
