@@ -21,6 +21,13 @@ from firable.nets.temporal_parts import atoms_in
 
 Natural = Annotated[int, Field(ge=0)]
 Hexadecimal = Annotated[str, Field(pattern=r"^(0|[1-9a-f][0-9a-f]*)$")]
+_SPOKEN_OF: Final = {
+    "then": {ClaimKind.LATER, ClaimKind.LEADS_TO, ClaimKind.NOT_LEADS_TO},
+    "fairness": {ClaimKind.LEADS_TO, ClaimKind.NOT_LEADS_TO},
+    "fires": {ClaimKind.FIRES, ClaimKind.IN_ORDER},
+}
+"""Which kinds of claims speak of what stands beside the goal."""
+_OF_NO_GOAL: Final = {ClaimKind.ORDERED, ClaimKind.UNORDERED, ClaimKind.LIVE, ClaimKind.HOME}
 APART_MAX: Final = 100_000
 """How many markings of a set are written each for itself; of more the steps between them, which are shorter."""
 
@@ -41,8 +48,14 @@ class ClaimRecord(Data):
     fires: list[str] = []
 
     def of(self, net: Net) -> Claim:
-        """The claim, its names looked up."""
+        """The claim, its names looked up; refused where it says what nobody would look at."""
+        said = {"then": bool(self.then), "fairness": self.fairness is not Fairness.NONE, "fires": bool(self.fires)}
+        for what, kinds in _SPOKEN_OF.items():
+            if said[what] and self.kind not in kinds:
+                raise ValueError(f"a claim of the kind '{self.kind}' does not speak of '{what}'")
         goal: Temporal = parse_formula(self.goal) if self.kind in STATE_GOALS else parse_temporal(self.goal)
+        if self.kind in _OF_NO_GOAL and goal != TRUE:
+            raise ValueError(f"a claim of the kind '{self.kind}' has no goal")
         if self.kind not in STATE_GOALS:
             wanted = Logic.CTL if self.kind is ClaimKind.CTL else Logic.LTL
             if wanted not in logics(goal):
