@@ -1,0 +1,97 @@
+"""What is read off the net needs no claim: races in some order, and what fires for ever in the arbitrated run."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import partial
+
+import pytest
+from support.evidence_examples import ENDING, LOOP
+
+from firable.analysis.evidence.claims import Claim, ClaimKind
+from firable.analysis.evidence.meaning import suffices
+from firable.analysis.evidence.read_off import eager_cycle, read_off
+from firable.nets.formula import Firable
+from firable.nets.net import ExternalGate, Net, Place, Signal, Transition, holding
+from firable.nets.text import parse_net
+from firable.semantics.trace import Discipline
+
+
+def racing(*closed: str, rivals: Iterable[str] = (), apart: Iterable[str] = ()) -> Net:
+    """Of each pair of letters the first closes a gate of the second; of those apart no valuation opens two."""
+    letters, apart = sorted(set("".join(closed))), list(apart)
+    transitions = [
+        Transition(
+            name,
+            (name.upper(), *(("SHARED",) if name in rivals else ())),
+            permissive=tuple(before.upper() for before, after in closed if after == name),
+            external=(ExternalGate("open", wanted=name == apart[0]),) if name in apart else (),
+        )
+        for name in letters
+    ]
+    places = tuple(Place(name, marked=True) for name in (*map(str.upper, letters), "SHARED"))
+    return Net("racing", places, tuple(transitions), (Signal("open"),))
+
+
+@pytest.mark.parametrize(
+    ("of", "ordered"),
+    [
+        (racing("tu"), True),
+        (racing("tu", "uv"), True),
+        (racing("tu", "tv", "uw", "vw"), True),
+        (racing("tu", "ut"), False),
+        (racing("tu", "uv", "vt"), False),
+        (racing("st", "tu", "ut"), False),
+        (racing("tu", "ut", "us"), False),
+        (racing("st", "tu", "us", "vw"), False),
+        (racing("tu", "ut", rivals="tu"), True),  # which never fire together
+        (racing("tu", "ut", rivals="t"), False),
+        (racing("tu", "ut", apart="tu"), True),
+        (racing("tu", "ut", apart="t"), False),
+    ],
+)
+def test_steps_have_an_order_where_the_races_in_them_have_one(of: Net, ordered: bool) -> None:
+    name = "steps-serialisable"
+    assert suffices(of, Discipline.STEP, name, proved=True, claims=[], query=None) is ordered
+    assert not suffices(of, Discipline.STEP, name, proved=False, claims=[], query=None)
+    assert read_off(of, Discipline.INTERLEAVING, name) is None
+
+
+CELL = """\
+firable: 1
+cell: c
+controllers:
+  robot:
+    start: [free, keep]
+    places:
+      free:
+      keep:
+      go: {send: {machine: R, command: MOVE}, until: there, within: 5s}
+transitions:
+  start: {from: robot.free, to: robot.go}
+  end: {from: robot.go, to: robot.free}
+  again: {from: robot.go_fault, to: robot.go}
+  kept: {from: robot.free, unless: robot.keep}
+"""
+
+
+def test_what_waits_until_a_time_is_over_need_not_fire_for_ever_and_what_is_held_up_starves() -> None:
+    of = parse_net(CELL)
+    assert eager_cycle(of) == {"start", "end", "again", "robot.go_timeout"}
+    asked = partial(suffices, of, Discipline.INTERLEAVING, "starvation", query=None)
+    assert not asked(proved=True, claims=[])
+    assert asked(proved=True, claims=[Claim(ClaimKind.NEVER, Firable("kept"))])
+    assert not asked(proved=False, claims=[Claim(ClaimKind.ALWAYS_POSSIBLE, Firable("again"))])
+    assert asked(proved=False, claims=[Claim(ClaimKind.ALWAYS_POSSIBLE, Firable("kept"))])
+
+
+def test_in_an_arbitrated_run_that_ends_nothing_fires_for_ever() -> None:
+    assert eager_cycle(ENDING) == frozenset()
+    assert suffices(ENDING, Discipline.INTERLEAVING, "starvation", True, [Claim(ClaimKind.NEVER, Firable("end"))], None)
+    assert not suffices(ENDING, Discipline.INTERLEAVING, "starvation", True, [], None)
+
+
+def test_what_is_never_opened_does_not_fire_in_the_arbitrated_run() -> None:
+    both = (ExternalGate("s", wanted=True), ExternalGate("s", wanted=False))
+    shut = Transition("shut", ("z",), external=both)
+    of = replace(LOOP, transitions=(*LOOP.transitions, shut), signals=(Signal("s"),), places=holding(LOOP.places, 5))
+    assert eager_cycle(of) == {"t0", "t1"}
