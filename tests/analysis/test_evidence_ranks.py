@@ -44,6 +44,10 @@ NESTED = Net(  # `now` is enabled in c only, to which `leave` leads from a only,
         Transition("now", ("asked",), ("done",), permissive=("c",)),
     ),
 )
+THROUGH = replace(  # the same, where c is two firings away from a
+    NESTED,
+    transitions=(NESTED.transitions[0], Transition("leave", ("b",), ("c",)), *NESTED.transitions[3:]),
+)
 ASTRAY = replace(NESTED, transitions=(*NESTED.transitions[:2], Transition("in", ("c",), ("a",)), NESTED.transitions[4]))
 CHAIN = Net(  # who comes from a waits in b, where something fires at all times and changes nothing
     "chain",
@@ -98,6 +102,7 @@ TIGHT = [
     sometimes("a asked: 0 0", "b asked: 0"),
     either("0: go"),
     nested(NESTED, "a asked: 0 0", "b asked: 0 0 0"),
+    nested(THROUGH, "a asked: 0 1", "b asked: 0 0", helpful=("0: now",)),
     response(CHAIN, Fairness.WEAK, "asked", ("a:", "b:", "done:")),
 ]
 LOOSE = {
