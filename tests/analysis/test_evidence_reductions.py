@@ -7,7 +7,7 @@ from itertools import combinations
 
 import pytest
 from support.evidence import document
-from support.evidence_examples import EXAMPLES, reduced
+from support.evidence_examples import ENDING, EXAMPLES, reduced
 from support.examples import seeds
 from support.reduction_forging import drawn_net, drawn_steps, met, reached, taken
 from support.small_text import net_of
@@ -17,6 +17,7 @@ from support.true_claims import true
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.certificate import (
     Clause,
+    Diagram,
     Equation,
     InductiveInvariant,
     Inequality,
@@ -38,8 +39,8 @@ from firable.analysis.evidence.refusal import TimeIsOverError, refuse
 from firable.analysis.goal import Limits
 from firable.nets.catalogue.families import family_net
 from firable.nets.diagnostics import InputError
-from firable.nets.formula import Deadlock, Firable, parse_formula
-from firable.nets.net import Net
+from firable.nets.formula import And, Deadlock, Firable, Holds, parse_formula
+from firable.nets.net import Net, Place, Transition
 from firable.semantics.trace import Discipline
 
 STEPS_MAX = 10
@@ -309,6 +310,49 @@ def test_what_is_said_of_a_net_that_nothing_is_left_of_is_looked_at() -> None:
     wrong = InductiveInvariant((Equation((), 1),))
     with pytest.raises(InputError, match="is 0 in the initial marking"):
         check_evidence(replace(found, certificate=replace(found.certificate, goal=parse_formula("true"), then=wrong)))
+
+
+HELD = Net(  # neither transition ever fires: one reads what is empty, the other one is held up by what is full
+    "held",
+    tuple(Place(name, marked=name in "aq") for name in "abpq"),
+    (Transition("t", ("a",), ("b",), permissive=("p",)), Transition("u", ("a",), ("b",), inhibitive=("q",))),
+)
+EITHER_WAY = Diagram(("a", "b"), ((1, 0, 1), (2, 2, 1)), (3,))
+
+
+def numbered(place: str, beside: str) -> Net:
+    """A token goes by m to another place, or stays where it is by a transition that does nothing."""
+    ways = (Transition("t", ("a",), ("m",)), Transition("u", ("m",), (place,)), Transition(beside))
+    return Net("numbered", (Place("a", marked=True), Place("m"), Place(place)), ways)
+
+
+@pytest.mark.parametrize(
+    ("of", "goal", "certificate"),
+    [
+        (HELD, "b", Reduction((), tuple("abpq"), Holds("b"), Labelling(Markings((HELD.initial_marking,))))),
+        (ENDING, "deadlock and a", Reduction((), ("a", "b"), Holds("a"), Labelling(Markings((1, 2))))),
+        (ENDING, "deadlock and a", Reduction((), ("a", "b"), Holds("a"), Labelling(EITHER_WAY))),
+        # What is composed bears its number, and something behind it where the net has that name.
+        *(
+            (
+                numbered(place, beside),
+                f"a and {place}",
+                Reduction(
+                    (Step(Rule.OPENERS_LATE, places=("m",)),),
+                    ("a", place),
+                    And((Holds("a"), Holds(place))),
+                    Labelling(Markings((1, 2))),
+                ),
+            )
+            for place, beside in (("b", "v"), ("3", "v"), ("b", "3"), ("3", "3-"))
+        ),
+    ],
+)
+def test_what_a_reduction_leaves_is_the_net_of_its_moves(of: Net, goal: str, certificate: Reduction) -> None:
+    claim = Claim(ClaimKind.NEVER, parse_formula(goal))
+    evidence = Evidence(of, Discipline.INTERLEAVING, claim, certificate)
+    assert true(evidence)
+    assert check_evidence(evidence).shown
 
 
 def test_of_a_net_that_nothing_is_left_of_nothing_is_said() -> None:
