@@ -7,7 +7,7 @@ is made here, and never read from the document: a certificate for another net sh
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
 from dataclasses import dataclass
 
 from firable.analysis.deadline import Deadline
@@ -95,7 +95,7 @@ def small_net(draft: Draft, places: Iterable[int]) -> Net:
     )
 
 
-def _transition(draft: Draft, number: int, taken: set[str]) -> Transition:
+def _transition(draft: Draft, number: int, taken: Set[str]) -> Transition:
     """The move as a transition, under its name if it is one of the net's; its number for a name else."""
     name = f"{number}"
     if number < len(draft.net.transitions):
@@ -103,7 +103,6 @@ def _transition(draft: Draft, number: int, taken: set[str]) -> Transition:
     else:
         while name in taken:
             name += "-"
-        taken.add(name)
     (needs, flips), of = draft.moves[number], draft.net.places
 
     def named(*, flipped: bool, value: bool) -> tuple[str, ...]:
