@@ -1,7 +1,9 @@
 """Runs as evidence: each thing that is asked of one is needed, or a claim that is false would be shown by it."""
 
+from dataclasses import replace
+
 import pytest
-from support.evidence_examples import ENDING, LOOP, TURNS, net
+from support.evidence_examples import ENDING, LOOP, RACING, TURNS, net
 from support.true_claims import true
 
 from firable.analysis.evidence.certificate import FiringSequence
@@ -64,3 +66,14 @@ def test_a_run_is_refused_where(name: str) -> None:
 def test_a_run_is_taken_where(name: str) -> None:
     assert true(TRUE[name])
     assert check_evidence(TRUE[name]).shown
+
+
+def test_the_step_without_order_is_the_last_of_its_run() -> None:
+    ways = (*RACING.transitions, Transition("on", (), ("c",), inhibitive=("a", "b")))
+    of = replace(RACING, places=(*RACING.places, Place("c")), transitions=ways)
+    both = Evidence(of, Discipline.STEP, Claim(ClaimKind.UNORDERED), FiringSequence((("t", "u"),)))
+    assert true(both)
+    assert check_evidence(both).shown
+    for firings in ((), (("t", "u"), ("on",))):
+        with pytest.raises(InputError, match="can be replayed one firing after the other"):
+            check_evidence(replace(both, certificate=FiringSequence(firings)))
