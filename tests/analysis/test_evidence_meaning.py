@@ -19,6 +19,7 @@ from firable.analysis.evidence.claims import FALSE, TRUE, Claim, ClaimKind, is_m
 from firable.analysis.evidence.document import document_from_text
 from firable.analysis.evidence.meaning import (
     commands_clash,
+    compete,
     competing,
     contact,
     never_beside,
@@ -31,9 +32,21 @@ from firable.analysis.report import report_on
 from firable.nets.catalogue import catalogue_net
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Or, Start, parse_formula
-from firable.nets.net import Command, ExternalGate, Net, Place, Property, PropertyKind, Signal, SignalKind, Transition
+from firable.nets.net import (
+    Command,
+    ExternalGate,
+    Fairness,
+    Net,
+    Place,
+    Property,
+    PropertyKind,
+    Signal,
+    SignalKind,
+    TemporalProperty,
+    Transition,
+)
 from firable.nets.queries import Query, QueryKind, query_named
-from firable.nets.temporal import format_temporal, parse_temporal
+from firable.nets.temporal import Logic, format_temporal, parse_temporal
 from firable.nets.verdict import Status
 from firable.semantics.trace import Discipline
 
@@ -399,9 +412,93 @@ ASKED = replace(
     properties=(
         Property("answered", PropertyKind.LEADS_TO, Holds("a"), Holds("b")),
         Property("possible", PropertyKind.ALWAYS_POSSIBLE, Holds("b")),
+        Property("never", PropertyKind.NEVER, Holds("z")),
+        Property("always", PropertyKind.ALWAYS, Holds("a")),
+        Property("reachable", PropertyKind.REACHABLE, Holds("b")),
+        TemporalProperty("linear", Logic.LTL, parse_temporal("G F a")),
+        TemporalProperty("branching", Logic.CTL, parse_temporal("AG AF a")),
     ),
 )
-ANSWERED = Claim(ClaimKind.LEADS_TO, Holds("a"), Holds("b"))
+ANSWERED = Claim(ClaimKind.LEADS_TO, Holds("a"), Holds("b"), Fairness.WEAK)
+SAID = {  # of each property what says that it holds, and that it is violated
+    "answered": (ANSWERED, replace(ANSWERED, kind=ClaimKind.NOT_LEADS_TO)),
+    "possible": (Claim(ClaimKind.ALWAYS_POSSIBLE, Holds("b")), Claim(ClaimKind.LOST, Holds("b"))),
+    "never": (*never("z"), *reachable("z")),
+    "always": (*never("not a"), *reachable("not a")),
+    "reachable": (*reachable("b"), *never("b")),
+    "linear": (of_formula(ClaimKind.LTL, "G F a"), of_formula(ClaimKind.NOT_LTL, "G F a")),
+    "branching": (of_formula(ClaimKind.CTL, "AG AF a"), of_formula(ClaimKind.CTL, "not AG AF a")),
+}
+
+
+def test_a_property_holds_or_is_violated_by_the_claim_that_says_so_and_by_no_other() -> None:
+    claims = [(name, proved, both[not proved]) for name, both in SAID.items() for proved in (True, False)]
+    claims.append(("", True, replace(ANSWERED, then=Constant(value=False))))
+    claims.append(("", False, replace(ANSWERED, kind=ClaimKind.NOT_LEADS_TO, then=Constant(value=False))))
+    claims.append(("", True, replace(ANSWERED, fairness=Fairness.STRONG)))
+    for name in SAID:
+        for proved in (True, False):
+            enough = {
+                (of, said)
+                for of, said, claim in claims
+                if suffices(ASKED, Discipline.INTERLEAVING, f"property.{name}", proved, [claim], None)
+            }
+            assert enough == {(name, proved)}
+    assert not suffices(ASKED, Discipline.INTERLEAVING, "property.other", True, [c for _, _, c in claims], None)
+
+
+@pytest.mark.parametrize(
+    ("name", "proved", "claim"),
+    [
+        ("home-markings", True, Claim(ClaimKind.HOME)),
+        ("home-markings", True, Claim(ClaimKind.ALWAYS_POSSIBLE, Start())),
+        ("quasi-live", True, Claim(ClaimKind.LIVE)),
+        ("quasi-live", True, in_order(TRUE, "t0", "t1")),
+        ("live", True, Claim(ClaimKind.LIVE)),
+        ("deadlock-free", True, Claim(ClaimKind.LIVE)),
+        ("deadlock-free", True, Claim(ClaimKind.ALWAYS_POSSIBLE, Firable("t0"))),
+        ("doomed-markings", True, Claim(ClaimKind.NEVER, Deadlock())),
+    ],
+)
+def test_one_claim_suffices(name: str, proved: bool, claim: Claim) -> None:
+    assert suffices(LOOP, Discipline.INTERLEAVING, name, proved, [claim], None)
+    assert not suffices(LOOP, Discipline.INTERLEAVING, name, not proved, [claim], None)
+    assert not suffices(LOOP, Discipline.INTERLEAVING, name, proved, [], None)
+
+
+def test_each_transition_is_shown_to_fire_in_a_way_of_its_own() -> None:
+    of, home = replace(LOOP, transitions=(*LOOP.transitions, Transition("t2", ("a",), ("z",)))), Start()
+    ways = [*reachable("firable(t2)"), Claim(ClaimKind.ALWAYS_POSSIBLE, home), fires(home, "t0"), fires(TRUE, "t1")]
+    assert suffices(of, Discipline.INTERLEAVING, "quasi-live", True, ways, None)
+    for left_out in (0, 2, 3):
+        less = [claim for i, claim in enumerate(ways) if i != left_out]
+        assert not suffices(of, Discipline.INTERLEAVING, "quasi-live", True, less, None)
+
+
+def test_steps_of_races_have_an_order_where_a_claim_says_so() -> None:
+    asked = partial(suffices, RACING, Discipline.STEP, "steps-serialisable", query=None)
+    ordered, unordered = Claim(ClaimKind.ORDERED), Claim(ClaimKind.UNORDERED)
+    assert asked(proved=True, claims=[ordered])
+    assert asked(proved=False, claims=[unordered])
+    assert not asked(proved=True, claims=[unordered])
+    assert not asked(proved=False, claims=[ordered])
+
+
+def test_two_transitions_compete_for_an_input_or_for_an_output() -> None:
+    of = net("shared", "a", ("a", "b"), ("b", "c"), ("a", "c"), ("c", "a"))
+    pairs = {frozenset((t.name, u.name)) for t in of.transitions for u in of.transitions if compete(of, t.name, u.name)}
+    assert pairs == {frozenset(("t0", "t2")), frozenset(("t1", "t2"))}
+
+
+def test_a_command_that_is_never_sent_needs_no_other_after_it() -> None:
+    places = (Place("a", marked=True), *(Place(name, command=Command("M", name)) for name in "bcd"))
+    ways = (Transition("go", ("a",), ("b",)), Transition("halt", ("b",), ("c",)), Transition("off", ("d",), ("d",)))
+    of = Net("m", places, (*ways, Transition("late", ("b", "c"), ("d",))))
+    asked = partial(suffices, of, Discipline.INTERLEAVING, "machine-never-stopped", proved=True, query=None)
+    assert asked(claims=[in_order(TRUE, "go", "halt"), *never("firable(off) or firable(late)")])
+    assert not asked(claims=[in_order(TRUE, "go", "halt"), *never("firable(off)")])
+    assert not asked(claims=[in_order(TRUE, "go", "halt")])
+    assert not asked(claims=never("firable(off) or firable(late)"))
 
 
 @pytest.mark.parametrize(

@@ -61,16 +61,20 @@ firable: 1
 cell: c
 controllers:
   robot:
-    start: [free, keep]
+    start: [free, keep, before]
     places:
       free:
       keep:
+      before:
+      after:
       go: {send: {machine: R, command: MOVE}, until: there, within: 5s}
 transitions:
   start: {from: robot.free, to: robot.go}
   end: {from: robot.go, to: robot.free}
   again: {from: robot.go_fault, to: robot.go}
   kept: {from: robot.free, unless: robot.keep}
+  once: {from: robot.before, to: robot.after}
+  held: {from: robot.after, unless: robot.keep}
 """
 
 
@@ -79,7 +83,9 @@ def test_what_waits_until_a_time_is_over_need_not_fire_for_ever_and_what_is_held
     assert eager_cycle(of) == {"start", "end", "again", "robot.go_timeout"}
     asked = partial(suffices, of, Discipline.INTERLEAVING, "starvation", query=None)
     assert not asked(proved=True, claims=[])
-    assert asked(proved=True, claims=[Claim(ClaimKind.NEVER, Firable("kept"))])
+    stopped = [Claim(ClaimKind.LOST, Firable(name)) for name in ("kept", "once", "held")]
+    assert asked(proved=True, claims=stopped)
+    assert not asked(proved=True, claims=stopped[:2])
     assert not asked(proved=False, claims=[Claim(ClaimKind.ALWAYS_POSSIBLE, Firable("again"))])
     assert asked(proved=False, claims=[Claim(ClaimKind.ALWAYS_POSSIBLE, Firable("kept"))])
 

@@ -11,7 +11,7 @@ from support.reduction_forging import sparse_net
 from support.second_solver import by_cvc5
 from support.small_text import net_of
 
-from firable.analysis.evidence.certificate import InductiveInvariant, Theorem, TheoremName
+from firable.analysis.evidence.certificate import Equation, InductiveInvariant, Theorem, TheoremName
 from firable.analysis.evidence.checking.checker import check_evidence
 from firable.analysis.evidence.checking.obligation import Evidence
 from firable.analysis.evidence.checking.siphons import of_siphons
@@ -98,3 +98,11 @@ def test_a_theorem_by_ranks_does_not_show_a_net_that_is_not_live(net: Net) -> No
         check_evidence(Evidence(net, Discipline.INTERLEAVING, Claim(ClaimKind.LIVE), theorem))
     (obligation,) = of_siphons(net, theorem, Terms())
     assert decide(obligation.asserted).answer is Answer.SAT
+
+
+@pytest.mark.parametrize("traps", [(), (("a", "b"), ("c",))])
+def test_a_theorem_shows_a_live_net_in_which_something_is_read(traps: tuple[tuple[str, ...], ...]) -> None:
+    net = net_of("a c", "t: a -> b if c", "u: b -> a")  # c is a siphon, and a trap, since who reads puts back
+    apart = InductiveInvariant((Equation((("a", 1), ("b", 1)), 1),))
+    theorem = Theorem(TheoremName.FREE_CHOICE, apart, traps)
+    assert check_evidence(Evidence(net, Discipline.INTERLEAVING, Claim(ClaimKind.LIVE), theorem)).shown
