@@ -5,13 +5,13 @@ from dataclasses import replace
 from functools import partial
 
 import pytest
-from support.evidence_examples import ENDING, LOOP
+from support.evidence_examples import ENDING, LOOP, net
 
 from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.analysis.evidence.meaning import suffices
 from firable.analysis.evidence.read_off import eager_cycle, read_off
 from firable.nets.formula import Firable
-from firable.nets.net import ExternalGate, Net, Place, Signal, Transition, holding
+from firable.nets.net import Arbiter, ArbitrationRule, ExternalGate, Net, Place, Signal, Transition, holding
 from firable.nets.text import parse_net
 from firable.semantics.trace import Discipline
 
@@ -23,7 +23,7 @@ def racing(*closed: str, rivals: Iterable[str] = (), apart: Iterable[str] = ()) 
         Transition(
             name,
             (name.upper(), *(("SHARED",) if name in rivals else ())),
-            permissive=tuple(before.upper() for before, after in closed if after == name),
+            permissive=tuple(pair[0].upper() for pair in closed if pair[1] == name),
             external=(ExternalGate("open", wanted=name == apart[0]),) if name in apart else (),
         )
         for name in letters
@@ -80,7 +80,7 @@ transitions:
 
 def test_what_waits_until_a_time_is_over_need_not_fire_for_ever_and_what_is_held_up_starves() -> None:
     of = parse_net(CELL)
-    assert eager_cycle(of) == {"start", "end", "again", "robot.go_timeout"}
+    assert eager_cycle(of) == frozenset({"start", "end", "again", "robot.go_timeout"})
     asked = partial(suffices, of, Discipline.INTERLEAVING, "starvation", query=None)
     assert not asked(proved=True, claims=[])
     stopped = [Claim(ClaimKind.LOST, Firable(name)) for name in ("kept", "once", "held")]
@@ -88,6 +88,20 @@ def test_what_waits_until_a_time_is_over_need_not_fire_for_ever_and_what_is_held
     assert not asked(proved=True, claims=stopped[:2])
     assert not asked(proved=False, claims=[Claim(ClaimKind.ALWAYS_POSSIBLE, Firable("again"))])
     assert asked(proved=False, claims=[Claim(ClaimKind.ALWAYS_POSSIBLE, Firable("kept"))])
+
+
+def test_who_reads_what_comes_late_is_late_and_who_fires_before_the_time_is_over_is_not() -> None:
+    of, before = parse_net(CELL), ExternalGate("robot.go_overdue", wanted=False)
+    early = tuple(replace(t, external=(before,)) if t.name == "start" else t for t in of.transitions)
+    asking = Transition("asking", ("robot.keep",), permissive=("robot.go_fault",))
+    late = {"again", "robot.go_timeout", "asking"}
+    assert eager_cycle(replace(of, transitions=(*early, asking))) == frozenset({"start", "end", *late})
+
+
+def test_in_rotation_each_fires_for_ever_and_by_priority_the_first() -> None:
+    of = net("taking turns", "a", ("a", "b"), ("a", "c"), ("b", "a"), ("c", "a"))
+    for by, fired in ((ArbitrationRule.ROTATION, {"t0", "t1", "t2", "t3"}), (ArbitrationRule.PRIORITY, {"t0", "t2"})):
+        assert eager_cycle(replace(of, arbiters=(Arbiter("first", ("t0", "t1"), by),))) == frozenset(fired)
 
 
 def test_in_an_arbitrated_run_that_ends_nothing_fires_for_ever() -> None:
@@ -100,4 +114,4 @@ def test_what_is_never_opened_does_not_fire_in_the_arbitrated_run() -> None:
     both = (ExternalGate("s", wanted=True), ExternalGate("s", wanted=False))
     shut = Transition("shut", ("z",), external=both)
     of = replace(LOOP, transitions=(*LOOP.transitions, shut), signals=(Signal("s"),), places=holding(LOOP.places, 5))
-    assert eager_cycle(of) == {"t0", "t1"}
+    assert eager_cycle(of) == frozenset({"t0", "t1"})

@@ -111,6 +111,15 @@ def test_a_run_that_refutes_a_formula_is_found(letters: list[int], text: str) ->
     assert not satisfied(run, formula)
 
 
+@pytest.mark.parametrize(
+    "other", ["G q", "(q R q)", "(p R q)", "F q", "X q", "(q U q)", "(p U q)", "(X q or q)", "(q W q)"]
+)
+def test_what_is_owed_beside_something_is_not_forgotten(other: str) -> None:
+    run, formula = lasso([(2, "t")], 0), parse_temporal(f"not (G p and {other})")
+    assert run.values(formula)[0]
+    assert satisfied(run, formula)
+
+
 @pytest.mark.parametrize("text", NESTED)
 def test_nested_operators_are_unfolded_right_with_few_looks_at_the_deadline(text: str) -> None:
     formula = parse_temporal(text)
