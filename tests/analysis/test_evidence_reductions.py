@@ -265,6 +265,9 @@ FALSE: dict[str, Callable[[], Evidence]] = {
     "the sets are of a larger net": lambda: of_rings(
         replace(LEFT, then=StubbornSets(Markings((0b01, 0b10)), (0b111,), (0, 0)))
     ),
+    "one of the sets is of a larger net": lambda: of_rings(
+        replace(LEFT, then=StubbornSets(Markings((0b01, 0b10)), (0b11, 0b111), (0, 0)))
+    ),
     "labels show nothing of it": lambda: of_rings(replace(LEFT, then=Labelling(Markings((1, 2)), (Ranks((0, 0)),)))),
     "steps are another discipline": lambda: replace(of_rings(LEFT), discipline=Discipline.STEP),
     "the markings are of the net itself": lambda: of_rings(
