@@ -46,6 +46,7 @@ class Method(StrEnum):
     COMPACT = "compact"
     WALK = "walk"
     PARIKH = "parikh"
+    PROJECTION = "projection"
     ON_THE_FLY = "on-the-fly"
 
 
@@ -73,15 +74,19 @@ SPACES: Final[dict[Method, Technique[SpaceMaker]]] = {
 KNOWERS: Final[dict[Method, Technique[Knower]]] = {
     Method.STRUCTURE: Technique("theorems on net classes", "firable.analysis.structure.theorems:decide_by_class"),
     Method.REDUCTION: Technique(
-        "walks on the reduced net, at large", "firable.analysis.reduction.deciding:known_by_reduction"
+        "walks and projections of the reduced net, at large", "firable.analysis.reduction.deciding:known_by_reduction"
     ),
     Method.STUBBORN_SETS: Technique("stubborn sets, at large", "firable.analysis.stubborn:known_firings"),
+    Method.PROJECTION: Technique(
+        "projections, one transition after the other", "firable.analysis.projection.refining:known_by_projection"
+    ),
     Method.COMPACT: Technique("compact search of all markings", "firable.analysis.compact:known_by_counting"),
 }
 
 WORTH_ASKING: Final[dict[Method, frozenset[str]]] = {
     Method.REDUCTION: frozenset({"quasi-live", "deadlock-free"}),
     Method.STUBBORN_SETS: frozenset({"quasi-live", "deadlock-free"}),
+    Method.PROJECTION: frozenset({"quasi-live"}),
     Method.COMPACT: frozenset({"contact-free", "deadlock-free", "quasi-live"}),
 }
 """Which verdicts must be open for a technique to be asked what it knows: one of these, or any where it is not named."""
@@ -89,7 +94,7 @@ WORTH_ASKING: Final[dict[Method, frozenset[str]]] = {
 FIRST_KNOWERS: Final = {Method.REDUCTION: 0.5, Method.STRUCTURE: 0.6}
 """Whom `auto` asks, in this order, and for which part of the time that is left.
 
-Stubborn sets know what those on the reduced net know, and later.
+Stubborn sets and projections know what those on the reduced net know, and later.
 """
 
 GOALS: Final[dict[Method, Technique[GoalDecider]]] = {
@@ -100,6 +105,7 @@ GOALS: Final[dict[Method, Technique[GoalDecider]]] = {
         "state equation", "firable.analysis.structure.state_equation:decide_by_state_equation"
     ),
     Method.PARIKH: Technique("Parikh vectors", "firable.analysis.structure.parikh:decide_by_parikh"),
+    Method.PROJECTION: Technique("projection", "firable.analysis.projection.refining:decide_by_projection"),
     Method.BOUNDED: Technique("bounded model checking", "firable.analysis.induction.bounded:decide_by_bounded_search"),
     Method.K_INDUCTION: Technique("k-induction", "firable.analysis.induction.k_induction:decide_by_k_induction"),
     Method.PDR: Technique("property-directed reachability", "firable.analysis.induction.pdr:decide_by_pdr"),
@@ -117,7 +123,7 @@ FORMULAS: Final[dict[Logic, dict[Method, Technique[FormulaDecider]]]] = {
 
 GOAL_LANES: Final[tuple[tuple[Method, ...], ...]] = (
     (Method.REDUCTION, Method.PARIKH, Method.WALK, Method.STUBBORN_SETS, Method.BOUNDED),
-    (Method.STATE_EQUATION, Method.K_INDUCTION, Method.PDR, Method.COMPACT),
+    (Method.STATE_EQUATION, Method.PROJECTION, Method.K_INDUCTION, Method.PDR, Method.COMPACT),
 )
 """How `auto` races them: what finds violations beside what proves; each lane in turns that grow."""
 

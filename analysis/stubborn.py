@@ -29,6 +29,8 @@ from typing import Any, Final
 from firable.analysis._engine import BudgetExceeded, Search, Stubborn
 from firable.analysis.compiled import engine_limits, flat, nodes_of
 from firable.analysis.goal import Finding, Limits
+from firable.analysis.projection.projected import ROOM, Explored, Room
+from firable.analysis.projection.refining import Projections
 from firable.analysis.question import Known, no, yes
 from firable.analysis.spaces.reachability import REASONS
 from firable.analysis.spaces.space import WitnessError, Witnesses
@@ -188,6 +190,9 @@ class _Replay:
 _WALKED: Final = (2**14, 2**20)
 _TOGETHER_FIRST: Final = 2**12
 _ALONE_LEAST: Final = 2**8
+_PROJECTED: Final = 2**16
+_PROJECTIONS_MAX: Final = 8
+_FAILED_MAX: Final = 16
 
 
 def find_firings(net: Net, limits: Limits, original: Net | None = None) -> Firings:
@@ -228,11 +233,14 @@ class _Firings:
         self.fires: dict[int, Moment] = {}
         self.dead: set[int] = set()
         self.deadlock: tuple[int, ...] | None = None
+        self.projections = Projections(runs.net, runs.limits)
 
     def found(self) -> Firings:
         budget, bound, turn = _TOGETHER_FIRST, "", 0
         while self.open and not bound:
             self._walk(turn)
+            if turn > 0:
+                self._project(turn)
             bound = self._round(budget, one_by_one=turn > 0) if self.open else ""
             budget, turn = min(4 * budget, _MARKINGS_MAX), turn + 1
         names = self.runs.net.transitions
@@ -298,6 +306,33 @@ class _Firings:
         if t in self.open:
             self.open.remove(t)
             self.fires[t] = moment
+
+    def _project(self, turn: int) -> None:
+        """Find open transitions dead, or runs to them, on few places of the net, in room that grows by turns.
+
+        This is given up for the turn after so many markings of projections, and so many transitions.
+        """
+        search, failed = self.projections, 0
+        search.room = Room(_PROJECTED * 4**turn, 0 if turn < 3 else ROOM.diagram_bytes)
+        most = search.markings + _PROJECTIONS_MAX * search.room.markings
+        for t in sorted(self.open):
+            if failed > _FAILED_MAX * turn or search.markings > most or self.runs.limits.deadline.over:
+                break
+            if t not in self.open:
+                continue
+            try:
+                found = search.firing(t)
+            except BudgetExceeded:
+                failed += 1
+                continue
+            failed, most = 0, search.markings + _PROJECTIONS_MAX * search.room.markings
+            if isinstance(found, Explored):
+                search.dead.add(t)
+            else:
+                self._play(Way(None, found), self.replay.start, [(t, len(found))])
+            dead = search.dead & self.open
+            self.dead |= dead
+            self.open -= dead
 
     def _round(self, budget: int, *, one_by_one: bool) -> str:
         """All together, then one by one, which is left to later rounds; why it must be the last, or nothing."""

@@ -1,8 +1,8 @@
 """What shows that a goal is never met: of several ways the first that leads to it, from what is at hand to a search.
 
-At hand are the invariant of a finding, and the markings where they are few or a decision diagram holds them. Else the
-net is made smaller for the goal, and what is left of it has mostly few markings; else stubborn sets, a diagram, or an
-inductive invariant show it of the net as it is.
+At hand are the invariant of a finding, and the markings where they are few or a decision diagram holds them. Else few
+places of the net may exclude the goal; or the net is made smaller for it, and what is left of it has mostly few
+markings; else stubborn sets, a diagram, more places, or an inductive invariant show it of the net as it is.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ from firable.analysis.evidence.producing.stubborn import stubborn_sets
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.induction.k_induction import decide_by_k_induction
 from firable.analysis.induction.pdr import decide_by_pdr
+from firable.analysis.projection.projected import ROOM, Room
+from firable.analysis.projection.refining import decide_by_projection
 from firable.analysis.spaces.symbolic import SymbolicSpace
 from firable.analysis.structure.contact import decide_contact_by_invariants
 from firable.analysis.structure.state_equation import decide_by_state_equation
@@ -35,6 +37,7 @@ from firable.nets.formula import Formula
 from firable.nets.net import Net
 from firable.semantics.trace import Discipline
 
+_FEW: Final = Room(2**17, 0)
 _NOTHING_FOUND: Final[Mapping[Formula, Finding]] = {}
 
 
@@ -57,8 +60,9 @@ class Nevers:
             return found
         if isinstance(spaces.given, SymbolicSpace) and (found := self._on_diagram(goal)) is not None:
             return found
-        less = self.reduced(goal) or self._stubborn(goal)
-        return less or self._on_diagram(goal) or self._on_many(goal) or self._induced(goal)
+        less = self._projected(goal, _FEW) or self.reduced(goal) or self._stubborn(goal)
+        more = less or self._on_diagram(goal) or self._on_many(goal) or self._projected(goal, ROOM)
+        return more or self._induced(goal)
 
     def contact_excluded(self) -> NeverCertificate | None:
         """What shows that the net is contact-free."""
@@ -95,6 +99,14 @@ class Nevers:
             return reduction(self.net, goal, limits, never)
         except (BudgetExceeded, LackingError):
             return None
+
+    def _projected(self, goal: Formula, room: Room) -> Labelling | None:
+        """All markings on a few places that exclude the goal, with any tokens on the others."""
+        if self.discipline is Discipline.STEP:
+            return None
+        limits = Limits(self.spaces.part_of_a_search(0.2), self.spaces.limits.memory_bytes)
+        found = decide_by_projection(self.net, goal, limits, room=room)
+        return found.certificate if isinstance(found.certificate, Labelling) else None
 
     def _stubborn(self, goal: Formula) -> StubbornSets | None:
         """Few markings with stubborn sets, where they are few."""

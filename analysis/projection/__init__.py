@@ -1,0 +1,1 @@
+"""Proofs and runs found on a few places of a net."""
