@@ -183,6 +183,8 @@ class Projections:
             found = self._tried(steps, goal)
             if isinstance(found, tuple):
                 return found
+            if not found & ~self.kept:
+                raise WitnessError("a run of a projection is none in the net, and nothing is lacking for it")
             self.kept |= found
             on_these = self._on(self.kept)
             if (run := on_these.run_into(goal)) is None:
