@@ -12,8 +12,10 @@ with budgets of markings that grow; the last word has the quick one. All of this
 so the same net gives the same answer.
 
 A firing is asked for each transition (`find_firings`), in rounds that grow: random walks make most of them fire
-(`analysis/engine/src/stubborn/cover.rs`); then those that are open are asked for together, which is one search where
-most of them fire, and then one by one, which is next to nothing where they are dead for a reason nearby.
+(`analysis/engine/src/stubborn/cover.rs`); then projections (`firable.analysis.projection.refining`) show many dead at
+once, or lead to them, on a few components of the net. Where these close none, those that are open are asked for
+together, which is one search where most of them fire, and then one by one, which is next to nothing where they are dead
+for a reason nearby.
 
 The rejected alternative, stubborn sets that keep liveness or temporal properties, needs provisos on cycles and leaves
 little to save; those questions are asked of the whole state space.
@@ -191,8 +193,13 @@ _WALKED: Final = (2**14, 2**20)
 _TOGETHER_FIRST: Final = 2**12
 _ALONE_LEAST: Final = 2**8
 _PROJECTED: Final = 2**16
+"""How many markings a projection may have at first; it is to be a fraction of a second."""
 _PROJECTIONS_MAX: Final = 8
-_FAILED_MAX: Final = 16
+"""How many times that many all of them may have that close nothing."""
+_FAILED_MAX: Final = 4
+"""How many transitions are given up in a row, at first."""
+_DIAGRAMS_FROM: Final = 3
+"""From which turn on a projection of more markings may be a diagram, which takes seconds."""
 
 
 def find_firings(net: Net, limits: Limits, original: Net | None = None) -> Firings:
@@ -201,8 +208,8 @@ def find_firings(net: Net, limits: Limits, original: Net | None = None) -> Firin
     Where the net is a reduction of an `original` one whose transitions fire in it by the same names, it is replayed
     there.
 
-    Cost: in each round some firings at random, and as many markings for all open transitions together as for all of
-    them one by one; four times as many in the next.
+    Cost: in each round some firings at random and some markings of projections, and where these close nothing as many
+    markings for all open transitions together as for all of them one by one; four times as many in the next.
 
     >>> from firable.nets.net import Place, Transition
     >>> places = (Place("p", marked=True), Place("q"), Place("r"))
@@ -239,10 +246,10 @@ class _Firings:
         budget, bound, turn = _TOGETHER_FIRST, "", 0
         while self.open and not bound:
             self._walk(turn)
-            if turn > 0:
-                self._project(turn)
-            bound = self._round(budget, one_by_one=turn > 0) if self.open else ""
-            budget, turn = min(4 * budget, _MARKINGS_MAX), turn + 1
+            if self.open and not (turn > 0 and self._project(turn)):
+                bound = self._round(budget, one_by_one=turn > 0)
+                budget = min(4 * budget, _MARKINGS_MAX)
+            turn += 1
         names = self.runs.net.transitions
         dead, undecided = (tuple(names[t].name for t in sorted(of)) for of in (self.dead, self.open))
         return Firings(
@@ -307,16 +314,17 @@ class _Firings:
             self.open.remove(t)
             self.fires[t] = moment
 
-    def _project(self, turn: int) -> None:
+    def _project(self, turn: int) -> bool:
         """Find open transitions dead, or runs to them, on few places of the net, in room that grows by turns.
 
-        This is given up for the turn after so many markings of projections, and so many transitions.
+        This is given up for the turn after so many markings of projections, or so many transitions, that close none.
+        Whether it closed some.
         """
-        search, failed = self.projections, 0
-        search.room = Room(_PROJECTED * 4**turn, 0 if turn < 3 else ROOM.diagram_bytes)
+        search, failed, before = self.projections, 0, len(self.open)
+        search.room = Room(_PROJECTED * 4**turn, 0 if turn < _DIAGRAMS_FROM else ROOM.diagram_bytes)
         most = search.markings + _PROJECTIONS_MAX * search.room.markings
         for t in sorted(self.open):
-            if failed > _FAILED_MAX * turn or search.markings > most or self.runs.limits.deadline.over:
+            if failed > _FAILED_MAX * 4**turn or search.markings > most or self.runs.limits.deadline.over:
                 break
             if t not in self.open:
                 continue
@@ -333,6 +341,7 @@ class _Firings:
             dead = search.dead & self.open
             self.dead |= dead
             self.open -= dead
+        return len(self.open) < before
 
     def _round(self, budget: int, *, one_by_one: bool) -> str:
         """All together, then one by one, which is left to later rounds; why it must be the last, or nothing."""

@@ -178,18 +178,17 @@ class Projections:
 
         Raises `BudgetExceeded` where the limits come first; `kept` are the places of the last projection.
         """
-        self.kept, steps = 0, list[tuple[int, ...]]()
+        self.kept, run = 0, None
         while True:
-            found = self._tried(steps, goal)
+            found = self._tried(run or (), goal)
             if isinstance(found, tuple):
                 return found
-            if not found & ~self.kept:
+            if run is not None and not found & ~self.kept:
                 raise WitnessError("a run of a projection is none in the net, and nothing is lacking for it")
             self.kept |= found
             on_these = self._on(self.kept)
             if (run := on_these.run_into(goal)) is None:
                 return on_these
-            steps = run
 
     def firing(self, t: int) -> tuple[int, ...] | Explored:
         """The same for the goal that a transition may fire."""
