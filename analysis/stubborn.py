@@ -15,7 +15,7 @@ A firing is asked for each transition (`find_firings`), in rounds that grow: ran
 (`analysis/engine/src/stubborn/cover.rs`); then projections (`firable.analysis.projection.refining`) show many dead at
 once, or lead to them, on a few components of the net. Where these close none, those that are open are asked for
 together, which is one search where most of them fire, and then one by one, which is next to nothing where they are dead
-for a reason nearby.
+for a reason nearby. What is dead because some tokens are too few for it the state equation sees at once.
 
 The rejected alternative, stubborn sets that keep liveness or temporal properties, needs provisos on cycles and leaves
 little to save; those questions are asked of the whole state space.
@@ -24,9 +24,10 @@ little to save; those questions are asked of the whole state space.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from time import perf_counter
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from firable.analysis._engine import BudgetExceeded, Search, Stubborn
 from firable.analysis.compiled import engine_limits, flat, nodes_of
@@ -37,13 +38,17 @@ from firable.analysis.question import Known, no, yes
 from firable.analysis.spaces.reachability import REASONS
 from firable.analysis.spaces.space import WitnessError, Witnesses
 from firable.analysis.walk import SEED
-from firable.nets.formula import Deadlock, Formula
+from firable.nets.formula import Deadlock, Firable, Formula
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import Cost, Witness
 from firable.semantics.trace import Discipline
 
+T = TypeVar("T")
+
 METHOD: Final = "stubborn sets"
 WALKS: Final = "random walks"
+PROJECTION: Final = "projections"
+EQUATION: Final = "state equation and traps"
 _MARKINGS_MAX: Final = 2**32 - 2
 _BUDGETS: Final = ((2**15, 2**13), (2**18, 2**16), (2**21, 2**19))
 """Markings of a quick and of a thorough search, in turn; then a quick one without a bound."""
@@ -128,7 +133,8 @@ class Firings:
     """Which transitions can fire: those that do on one of the `ways`, the dead ones, and those left undecided.
 
     `fires` gives the moment at which a transition is firable. `deadlock` is a firing sequence to a deadlock, where one
-    was met. All of it was replayed, in the `original` net.
+    was met. All of it was replayed, in the `original` net. `closed_by` and `dead_by` are the methods that found any of
+    it, and any dead transition.
     """
 
     net: Net
@@ -140,6 +146,8 @@ class Firings:
     deadlock: tuple[int, ...] | None = None
     bound: str = ""
     cost: Cost = field(default_factory=Cost)
+    closed_by: tuple[str, ...] = ()
+    dead_by: tuple[str, ...] = ()
 
     def known(self) -> dict[str, Known]:
         """The verdicts `quasi-live` and `deadlock-free`, by name, where they are decided."""
@@ -147,9 +155,9 @@ class Firings:
         if (witness := self.way_to_deadlock("a marking of the net is a deadlock")) is not None:
             found["deadlock-free"] = Known(no((), witness), WALKS)
         if self.dead:
-            found["quasi-live"] = Known(no(self.dead), METHOD)
+            found["quasi-live"] = Known(no(self.dead), ", ".join(self.dead_by))
         elif not self.undecided:
-            found["quasi-live"] = Known(yes(), METHOD if self.cost.markings else WALKS)
+            found["quasi-live"] = Known(yes(), ", ".join(self.closed_by) or WALKS)
         return found
 
     def witness(self, name: str) -> Witness | None:
@@ -198,6 +206,9 @@ _PROJECTIONS_MAX: Final = 8
 """How many times that many all of them may have that close nothing."""
 _FAILED_MAX: Final = 4
 """How many transitions are given up in a row, at first."""
+_REFUTED_MAX: Final = 16
+"""How many transitions are asked of the state equation in a turn."""
+_REFUTING_SECONDS: Final = 2.0
 _DIAGRAMS_FROM: Final = 3
 """From which turn on a projection of more markings may be a diagram, which takes seconds."""
 
@@ -241,13 +252,17 @@ class _Firings:
         self.dead: set[int] = set()
         self.deadlock: tuple[int, ...] | None = None
         self.projections = Projections(runs.net, runs.limits)
+        self.closed_by: dict[str, None] = {}
+        self.dead_by: dict[str, None] = {}
 
     def found(self) -> Firings:
         budget, bound, turn = _TOGETHER_FIRST, "", 0
         while self.open and not bound:
-            self._walk(turn)
-            if self.open and not (turn > 0 and self._project(turn)):
-                bound = self._round(budget, one_by_one=turn > 0)
+            self._by(WALKS, partial(self._walk, turn))
+            if self.open and not (turn > 0 and self._by(PROJECTION, partial(self._project, turn))):
+                if turn > 0:
+                    self._by(EQUATION, partial(self._refute, turn))
+                bound = self._by(METHOD, partial(self._round, budget, one_by_one=turn > 0)) if self.open else ""
                 budget = min(4 * budget, _MARKINGS_MAX)
             turn += 1
         names = self.runs.net.transitions
@@ -262,7 +277,19 @@ class _Firings:
             self.deadlock,
             bound if undecided else "",
             self.runs.cost,
+            tuple(self.closed_by),
+            tuple(self.dead_by),
         )
+
+    def _by(self, method: str, stage: Callable[[], T]) -> T:
+        """What a stage says; the method is noted where it closes transitions."""
+        before = len(self.open), len(self.dead)
+        said = stage()
+        if len(self.open) < before[0]:
+            self.closed_by[method] = None
+        if len(self.dead) > before[1]:
+            self.dead_by[method] = None
+        return said
 
     def _walk(self, turn: int) -> None:
         """Make open transitions fire by random walks.
@@ -342,6 +369,24 @@ class _Firings:
             self.dead |= dead
             self.open -= dead
         return len(self.open) < before
+
+    def _refute(self, turn: int) -> None:
+        """Show open transitions dead by the state equation: one, and others only as long as they are.
+
+        It sees what is dead for a sum of tokens, which is spread over the whole net where no search and no few places
+        see it. Such transitions are many, so one in each turn is asked for.
+        """
+        from firable.analysis.structure.state_equation import decide_by_state_equation  # here: it loads a solver
+
+        asked = sorted(self.open)
+        begin = turn * len(asked) // _REFUTED_MAX % len(asked)
+        for t in (*asked[begin:], *asked[:begin])[:_REFUTED_MAX]:
+            limits = replace(self.runs.limits, deadline=self.runs.limits.deadline.within(_REFUTING_SECONDS))
+            goal = Firable(self.runs.net.transitions[t].name)
+            if decide_by_state_equation(self.runs.net, goal, limits).reachable is not False:
+                return
+            self.dead.add(t)
+            self.open.remove(t)
 
     def _round(self, budget: int, *, one_by_one: bool) -> str:
         """All together, then one by one, which is left to later rounds; why it must be the last, or nothing."""

@@ -23,7 +23,7 @@ from firable.analysis.race import Contestant, race
 from firable.analysis.reduction.components import parts
 from firable.analysis.reduction.reduce import reduce_for_goal, reduce_for_liveness
 from firable.analysis.spaces.symbolic import explore_symbolically
-from firable.analysis.stubborn import METHOD, decide_by_stubborn_sets, find_firings
+from firable.analysis.stubborn import decide_by_stubborn_sets, find_firings
 from firable.analysis.walk import decide_by_walk
 from firable.nets.formula import Constant, Formula
 from firable.nets.net import Net
@@ -159,7 +159,7 @@ def known_by_reduction(net: Net, limits: Limits) -> Mapping[str, Known]:
     found = firings.known()
     if firings.dead:
         dead = tuple(name for name, image in reduced.transitions.items() if image in firings.dead)
-        found["quasi-live"] = Known(no(dead), METHOD)
+        found["quasi-live"] = Known(no(dead), found["quasi-live"].method)
     return {name: replace(known, method=f"{known.method}, after {reduced.summary}") for name, known in found.items()}
 
 

@@ -253,7 +253,21 @@ def test_transitions_are_found_dead_and_firing_by_projections_alone(monkeypatch:
     assert (found.dead, found.undecided) == (("both", "read", "loop"), ())
     for transition in net.transitions[: -len(dead)]:
         assert found.witness(transition.name) is not None
-    assert found.known()["quasi-live"].answer.subjects == found.dead
+    known = found.known()["quasi-live"]
+    assert (known.answer.subjects, known.method) == (found.dead, "projections")
+
+
+def test_what_few_tokens_make_dead_is_found_by_the_state_equation_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    net = family_net("philosophers_either-10")
+    eating = tuple(f"p{i}.eating" for i in (3, 4))
+    net = replace(
+        net, transitions=(*net.transitions, *(Transition(f"t{i}", eating, (f"p{i}.left",)) for i in range(6, 9)))
+    )
+    monkeypatch.setattr(stubborn._Firings, "_project", lambda *_: False)
+    monkeypatch.setattr(stubborn._Firings, "_ask", lambda *_, **__: "")
+    found = find_firings(net, Limits())
+    assert (found.dead, found.undecided) == (("t6", "t7", "t8"), ())
+    assert found.known()["quasi-live"].method == "state equation and traps"
 
 
 def test_few_places_show_what_is_never_in_a_net_of_many() -> None:
