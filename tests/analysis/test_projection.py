@@ -257,6 +257,31 @@ def test_transitions_are_found_dead_and_firing_by_projections_alone(monkeypatch:
     assert (known.answer.subjects, known.method) == (found.dead, "projections")
 
 
+@pytest.mark.parametrize("stage", ["_project", "_refute"])
+@examples(75)
+@given(net=NETS)
+def test_what_a_stage_closes_is_so(stage: str, net: Net) -> None:
+    player = Player(net)
+    fires = {t for marking in player.reachable() for t in player.may_fire(marking)}
+    search = stubborn._Firings(stubborn._Runs(net, Limits()), net)
+    for turn in range(1, 1 + len(net.transitions)):
+        if search.open:
+            getattr(search, stage)(turn)
+    assert search.dead.isdisjoint(fires)
+    assert set(search.fires) <= fires
+    assert search.open == set(range(len(net.transitions))) - search.dead - set(search.fires)
+    if stage == "_project":
+        assert not search.open
+
+
+def test_the_methods_are_told_that_closed_transitions(monkeypatch: pytest.MonkeyPatch) -> None:
+    net = family_net("philosophers_either-10")
+    assert find_firings(net, Limits()).known()["quasi-live"].method == "random walks"
+    monkeypatch.setattr(stubborn._Firings, "_walk", lambda *_: None)
+    monkeypatch.setattr(stubborn._Firings, "_round", lambda *_, **__: "")
+    assert find_firings(net, Limits()).known()["quasi-live"].method == "projections"
+
+
 def test_what_few_tokens_make_dead_is_found_by_the_state_equation_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     net = family_net("philosophers_either-10")
     eating = tuple(f"p{i}.eating" for i in (3, 4))
