@@ -85,6 +85,12 @@ def test_exactly_the_transitions_that_fire_in_the_whole_graph_are_found_firing(n
             played(net, witness)
 
 
+def test_what_fires_for_ever_and_changes_nothing_holds_nobody_up() -> None:
+    net = Net("idle", (Place("p"),), (Transition("idle"), Transition("dead", ("p",))))
+    found = find_firings(net, Limits())
+    assert (found.dead, found.undecided, found.deadlock) == (("dead",), (), None)
+
+
 @pytest.mark.seeds
 @pytest.mark.parametrize("chunk", range(4))
 def test_no_order_that_matters_is_left_out_of_nets_whose_transitions_compete(chunk: int) -> None:

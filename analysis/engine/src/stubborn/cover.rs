@@ -74,6 +74,8 @@ struct Search<'a> {
     archive: Vec<Start>,
     plan: Plan<'a>,
     random: Random,
+    /// Whether no firing in M0 leads to another marking.
+    nowhere_to_go: bool,
     found: Cover,
 }
 
@@ -91,6 +93,7 @@ impl<'a> Search<'a> {
             archive: vec![Start { marking: net.initial.clone(), at: None, visits: 0 }],
             plan: Plan::new(dependencies, net.places, count),
             random: Random::new(seed),
+            nowhere_to_go: false,
             found: Cover::default(),
         };
         for &t in open.iter().filter(|&&t| dependencies.able(t)) {
@@ -113,8 +116,7 @@ impl<'a> Search<'a> {
     fn run(&mut self, max_steps: u64, watch: &mut Watch<'_>) -> Result<(), Stop> {
         let unit = UNIT.max(self.net.transitions.len().min(LENGTH_MAX / 64));
         for round in 1_u64.. {
-            let nowhere_to_go = self.found.deadlock.as_ref().is_some_and(Vec::is_empty);
-            if self.open.is_empty() || nowhere_to_go || self.found.steps >= max_steps {
+            if self.open.is_empty() || self.nowhere_to_go || self.found.steps >= max_steps {
                 break;
             }
             let from = self.start(round);
@@ -145,6 +147,7 @@ impl<'a> Search<'a> {
         self.plan.forget();
         while path.len() < length && !self.open.is_empty() {
             if walker.stuck() {
+                self.nowhere_to_go |= from == 0 && path.is_empty();
                 if walker.firable.is_empty() && self.found.deadlock.is_none() {
                     let whole = self.whole_path(self.archive[from].at, &path);
                     let (deadlock, places) = (&mut Target::Deadlock, self.net.places);
@@ -295,5 +298,15 @@ mod tests {
             }
         }
         assert_eq!(found.deadlock.map(|path| path.len()), Some(200));
+    }
+
+    #[test]
+    fn walks_end_where_no_firing_leads_to_another_marking() {
+        let transitions = vec![Transition::new(&[], &[], &[], &[], &[]), Transition::new(&[0], &[], &[], &[], &[])];
+        let net = Net::new(1, transitions, &[]).expect("well formed");
+        let (mut poll, dependencies) = (unwatched, Dependencies::new(&net));
+        let (found, end) = cover(&net, &dependencies, &[0, 1], 1, 100, &mut Watch::new(None, &mut poll));
+        assert_eq!((end, found.steps, found.deadlock), (Ok(()), 0, None));
+        assert_eq!(found.ways, [Way { from: None, firings: vec![], firable: vec![(0, 0)] }]);
     }
 }
