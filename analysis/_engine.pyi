@@ -80,8 +80,8 @@ def explore(
 class Graph:
     """A reachability graph. Markings are stored, edges are computed again when they are asked for.
 
-    Once questions that go against them (`backward`) have tried more than it takes to store them, edges are kept, turned
-    round, where `max_memory_bytes` has room for them.
+    Where `max_memory_bytes` has room for several times the edges they are kept, turned round, once questions that go
+    against them (`backward`) have tried more than it takes to store them; under steps, from the first such question on.
     """
 
     @property

@@ -101,9 +101,9 @@ def check(
     """Decide every verdict on a net under a discipline, external gates free, by the method named.
 
     The verdicts on `queries` follow those on the net's own properties; where not `of_the_net` these are all that is
-    asked. `progress` is told how many markings and edges
-    are found, and `tell` in words how far it is with verdicts that are settled one by one. Ctrl-C, which leaves unknown
-    what is not decided yet, sets `interrupted`; where it is set already, for another net, nothing is begun.
+    asked. `progress` is told how many markings and edges are found, and `tell` in words how far it is with verdicts
+    that are settled one by one. Ctrl-C, which leaves unknown what is not decided yet, sets `interrupted`; where it is
+    set already, for another net, nothing is begun.
 
     Raises `InputError` F2001 where two queries have one name, F2013 where the arbiters do not fit the conflicts of the
     net, F3004 where the budget does not hold the net itself, F3006 where the method knows no synchronous steps.

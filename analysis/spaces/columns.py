@@ -112,8 +112,8 @@ class Room:
     def __init__(self, size_bytes: int) -> None:
         self._left = size_bytes
 
-    def holds(self, packed_column: Any) -> bool:
-        """Whether there is room for one more, which is taken."""
+    def takes(self, packed_column: Any) -> bool:
+        """Whether there is room for one more, which is used up then."""
         fits = bool(packed_column.nbytes <= self._left)
         self._left -= packed_column.nbytes if fits else 0
         return fits
@@ -134,7 +134,7 @@ class Places:
         if (kept := self._kept.get((start, place))) is not None:
             return kept
         found = packed((self._rows[start : start + PART, place // 64] & np.uint64(1 << place % 64)) != 0)
-        if self._room.holds(found):
+        if self._room.takes(found):
             self._kept[start, place] = found
         return found
 

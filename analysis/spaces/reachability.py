@@ -203,12 +203,15 @@ class ReachabilityGraph(Derived["Column"]):
 
         if not isinstance(formula, Or) or not _is_large(formula):
             return super().satisfying(formula)
-        if any(map(_is_large, formula.operands)):
-            return self.algebra.disjunction(map(self.satisfying, formula.operands))
+        large = tuple(filter(_is_large, formula.operands))
+        if large:
+            small = tuple(part for part in formula.operands if not _is_large(part))
+            whole = self.algebra.disjunction(map(self.satisfying, large))
+            return self.algebra.disjunction([whole, super().satisfying(Or(small))])
         if (kept := self._satisfying.get(formula)) is not None:
             return restored(kept, self.n_markings)
         found = super().satisfying(formula)
-        if self._room.holds(column := packed(found)):
+        if self._room.takes(column := packed(found)):
             self._satisfying[formula] = column
         return found
 

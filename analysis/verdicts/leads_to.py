@@ -25,7 +25,7 @@ from firable.analysis._engine import BudgetExceeded
 from firable.analysis.compiled import engine_limits
 from firable.analysis.question import Answer, no, yes
 from firable.analysis.spaces.columns import NO_COMPONENT, Column, first
-from firable.analysis.spaces.reachability import ReachabilityGraph
+from firable.analysis.spaces.reachability import REASONS, ReachabilityGraph
 from firable.analysis.spaces.space import S, StateSpace, WitnessError, Witnesses
 from firable.analysis.verdicts.fair_runs import fair_markings
 from firable.analysis.verdicts.unanswered import unanswered
@@ -118,10 +118,12 @@ def _cycle(graph: ReachabilityGraph, within: Column, fairness: Fairness, entry: 
     walk = _Walk(graph, within, entry)
     if fairness is Fairness.STRONG:
         for t, count in enumerate(graph.fired()):
+            if graph.deadline.over:
+                raise BudgetExceeded(REASONS["time"])
             if count and t not in walk.fired and (enabled := graph.may_fire(t) & within).any():
                 walk.fire(t, enabled)
     elif fairness is Fairness.WEAK:
-        while owed := walk.lasting - walk.fired:
+        while owed := walk.lasting() - walk.fired:
             t = min(owed)
             enabled = graph.may_fire(t) & within
             disabled = within & ~enabled
@@ -143,11 +145,21 @@ class _Walk:
     at: int
     firings: list[FiringSet] = field(default_factory=list)
     fired: set[int] = field(default_factory=set)
-    lasting: set[int] = field(init=False)
-    """The transitions that were enabled all the time."""
+    visited: list[int] = field(init=False)
+    """The markings that it has met, of which `lasting` has not yet been told."""
+    _lasting: set[int] | None = None
 
     def __post_init__(self) -> None:
-        self.lasting = self._enabled()
+        self.visited = [self.at]
+
+    def lasting(self) -> set[int]:
+        """The transitions that were enabled all the time: each is on some edge of every marking, under steps too, where
+        some step that may be taken holds it."""
+        for index in self.visited:
+            enabled = {t for fired, _ in self.graph.successors(index) for t in fired}
+            self._lasting = enabled if self._lasting is None else self._lasting & enabled
+        self.visited.clear()
+        return self._lasting or set()
 
     def go(self, targets: Column) -> None:
         """Go on to the nearest target."""
@@ -178,11 +190,7 @@ class _Walk:
         self.firings.append(fired)
         self.fired.update(fired)
         self.at = target
-        self.lasting &= self._enabled()
-
-    def _enabled(self) -> set[int]:
-        """The transitions that some edge fires: under steps, too, each that is enabled is in one that may be taken."""
-        return {t for fired, _ in self.graph.successors(self.at) for t in fired}
+        self.visited.append(target)
 
 
 def check_lasso(

@@ -168,4 +168,4 @@ def test_the_figures_and_verdicts_of_a_report_are_json() -> None:
 
 def test_a_room_is_full_at_some_time() -> None:
     room = columns.Room(10)
-    assert [room.holds(np.zeros(size, np.uint8)) for size in (8, 3, 2, 1, 0)] == [True, False, True, False, True]
+    assert [room.takes(np.zeros(size, np.uint8)) for size in (8, 3, 2, 1, 0)] == [True, False, True, False, True]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 
 import networkx as nx
@@ -135,6 +136,11 @@ def asked_again(graph: _engine.Graph, often: int = 1) -> int:
     return graph.memory_bytes
 
 
+def on_and_off(place: int) -> tuple[Row, Row]:
+    """A machine of two places."""
+    return ([place], [place + 1], [], [], []), ([place + 1], [place], [], [], [])
+
+
 def kept(graph: _engine.Graph) -> int:
     """The bytes of all edges turned round."""
     return 4 * graph.n_edges + 8 * (graph.n_markings + 1)
@@ -158,9 +164,7 @@ def test_edges_that_are_kept_answer_as_those_that_are_computed_again(
 
 
 def test_edges_that_do_not_fit_are_computed_again() -> None:
-    rows = list[Row]()
-    for i in range(0, 20, 2):
-        rows += [([i], [i + 1], [], [], []), ([i + 1], [i], [], [], [])]
+    rows = [row for i in range(0, 20, 2) for row in on_and_off(i)]
     net = Drawn(20, rows, list(range(0, 20, 2)))
     roomy, tight = explore(net, max_memory_bytes=1 << 20), explore(net, max_memory_bytes=90_000)
     assert roomy.complete
@@ -230,3 +234,30 @@ def test_fairness_that_does_not_exist_is_refused_and_a_part_of_a_graph_answers_n
     part = explore(net, max_markings=1)
     with pytest.raises(_engine.IncompleteGraph, match="that a fair run can go on for ever"):
         part.fair([0], "weak")
+
+
+def test_edges_that_are_kept_leave_room_for_those_that_a_question_stores() -> None:
+    rows = [row for i in range(0, 20, 2) for row in on_and_off(i)]
+    net = Drawn(20, rows, list(range(0, 20, 2)))
+    everything = explored(net, step=False)
+    asked_again(everything, OFTEN)
+    for room in range(1, 9):
+        graph = explore(net, max_memory_bytes=90_000 + room * kept(everything))
+        held = asked_again(graph)
+        is_kept = asked_again(graph, OFTEN) > held
+        assert is_kept == (90_000 + room * kept(everything) - held >= 6 * kept(everything))
+        within = bytes([1] * graph.n_markings)
+        if room >= 3:
+            assert len(graph.components(within)) == 1
+            assert set(np.frombuffer(graph.fair(within, "strong"), "<u4").tolist()) == {0}
+
+
+def test_edges_are_not_stored_where_that_would_take_the_time_of_the_question() -> None:
+    rows = [row for i in range(0, 24, 2) for row in on_and_off(i)]
+    graph = explored(Drawn(24, rows, list(range(0, 24, 2))), step=False)
+    held = asked_again(graph, OFTEN - 1)
+    late = graph.seconds  # of the four times as much that storing may take
+    with contextlib.suppress(_engine.BudgetExceeded):
+        graph.backward([0], max_seconds=late)
+    assert graph.memory_bytes == held
+    assert asked_again(graph) > held

@@ -4,7 +4,7 @@
 //! edge and 8 a marking within the memory budget: for the components, and turned round for what goes against them.
 
 use crate::batch::Batch;
-use crate::budget::{Memory, Stop, Watch};
+use crate::budget::{CLOCK_EVERY, Memory, Stop, Watch};
 use crate::edges::{Edges, Fired};
 use crate::exact::ROOM;
 use crate::explore::Space;
@@ -75,6 +75,12 @@ impl Csr {
         size_of_val(self.offsets.as_slice()) + size_of_val(self.targets.all())
     }
 
+    /// Bytes that the rows of all edges take, if that is a number of bytes.
+    pub fn bytes_of(space: &Space) -> Option<usize> {
+        let targets = usize::try_from(space.edges).ok()?.checked_mul(size_of::<u32>())?;
+        (space.len() + 1).checked_mul(size_of::<u64>())?.checked_add(targets)
+    }
+
     /// The successors of a marking.
     pub fn targets(&self, index: u32) -> &[u32] {
         &self.targets.all()[self.offsets[index as usize] as usize..self.offsets[index as usize + 1] as usize]
@@ -85,8 +91,9 @@ impl Csr {
         let count = self.offsets.len() - 1;
         let mut offsets = memory.filled(0u64, count + 2)?;
         let mut sources = memory.filled(0u32, self.targets.all().len())?;
-        for &target in self.targets.all() {
-            offsets[target as usize + 2] += 1;
+        for part in self.targets.all().chunks(CLOCK_EVERY) {
+            part.iter().for_each(|&target| offsets[target as usize + 2] += 1);
+            watch.tick(part.len())?;
         }
         for index in 0..=count {
             offsets[index + 1] += offsets[index];

@@ -1,6 +1,7 @@
 //! The edges that leave markings, computed again from the rule, 64 markings at a time as in the exploration.
 //!
-//! Storing them was rejected: they are recomputed faster than they are read back, and cost more than the markings.
+//! Storing them was rejected, but for questions that go against them again and again (`fixpoints.rs`): they are recomputed
+//! faster than they are read back, and cost more than the markings.
 
 use crate::batch::Batch;
 use crate::budget::{Memory, Stop, Watch};

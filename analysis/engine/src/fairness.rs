@@ -17,6 +17,7 @@
 //! graph has edges where most components are single markings.
 
 use crate::budget::{Memory, Stop, Watch};
+use crate::csr::Csr;
 use crate::edges::Edges;
 use crate::explore::Space;
 use crate::scc::Scc;
@@ -53,13 +54,20 @@ pub fn fair(space: &Space, mut within: Vec<u8>, fairness: Fairness, watch: &mut 
     let mut judge = Judge::new(space, watch)?;
     let mut components = 0;
     loop {
-        let scc = Scc::new(space, Some(&within), watch)?;
-        let (order, starts) = by_component(&scc, &memory)?;
+        let scc = {
+            let round = memory.clone();
+            let edges = Csr::new(space, Some(&within), &round, watch)?;
+            Scc::of_edges(&edges, Some(&within), &round, watch)?
+        };
+        let round = memory.clone();
+        round.claim(scc.bytes())?;
+        let (order, starts) = by_component(&scc, &round, watch)?;
         let mut again = false;
         for (component, row) in starts.windows(2).enumerate() {
             let members = &order[row[0] as usize..row[1] as usize];
             if scc.trivial[component] != 0 {
                 members.iter().for_each(|&member| within[member as usize] = 0);
+                watch.tick(members.len())?;
                 continue;
             }
             let is_fair = fairness == Fairness::None || judge.is_fair(members, &scc.of, fairness, &memory, watch)?;
@@ -74,7 +82,6 @@ pub fn fair(space: &Space, mut within: Vec<u8>, fairness: Fairness, watch: &mut 
                 members.iter().for_each(|&member| within[member as usize] = 0);
             }
         }
-        memory.release(size_of_val(order.as_slice()) + size_of_val(starts.as_slice()));
         if !again {
             judge.edges.finish(&memory);
             return Ok(fair);
@@ -83,7 +90,7 @@ pub fn fair(space: &Space, mut within: Vec<u8>, fairness: Fairness, watch: &mut 
 }
 
 /// The markings that are in a component, component by component, and where each begins.
-fn by_component(scc: &Scc, memory: &Memory) -> Result<(Vec<u32>, Vec<u32>), Stop> {
+fn by_component(scc: &Scc, memory: &Memory, watch: &mut Watch<'_>) -> Result<(Vec<u32>, Vec<u32>), Stop> {
     let mut starts = memory.filled(0u32, scc.sizes.len() + 1)?;
     for (component, &size) in scc.sizes.iter().enumerate() {
         starts[component + 1] = starts[component] + size;
@@ -95,6 +102,7 @@ fn by_component(scc: &Scc, memory: &Memory) -> Result<(Vec<u32>, Vec<u32>), Stop
         let at = &mut next[component as usize];
         order[*at as usize] = index as u32;
         *at += 1;
+        watch.tick(1)?;
     }
     memory.release(size_of_val(next.as_slice()));
     Ok((order, starts))

@@ -3,8 +3,8 @@
 //! As in the exploration, a transition is tested for all 64 by bit slices, what it gives is gathered, and the table is
 //! asked for a batch, so that its cache misses overlap. A question like "has it a successor in this set" is settled
 //! for most markings by one or two edges; so the visitor says of each edge whether its marking is done with, and no
-//! further transition is tested for that one. Storing edges was rejected: they are recomputed about as fast as they
-//! are read back, and cost more than the markings.
+//! further transition is tested for that one. Storing edges was rejected, but for who asks again and again
+//! (`fixpoints.rs`): they are recomputed about as fast as they are read back, and cost more than the markings.
 
 use crate::batch::Batch;
 use crate::budget::{Stop, Watch};

@@ -14,10 +14,12 @@
 //! predecessors count one less (Arnold and Crubille, "A linear algorithm to solve fixed-point equations on transition
 //! systems", 1988). Sweeping until nothing changes was rejected: on a chain it is quadratic.
 //!
-//! Under steps, where the rule has no simple reverse, edges are stored for each question.
+//! Under steps, where the rule has no simple reverse, edges are stored for the first question already, and for each that
+//! goes by some transitions alone, or for ever inside a set.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
 
 use crate::bits::{Agenda, Bits};
 use crate::budget::{Stop, Watch};
@@ -43,10 +45,9 @@ impl Against {
         self.edges.get().and_then(Option::as_ref)
     }
 
-    /// The edges, if they are worth it and there is room: their bytes count as held by the graph.
+    /// The edges, if they are stored or worth it now: their bytes count as held by the graph.
     fn edges(&self, space: &Space, watch: &mut Watch<'_>) -> Result<Option<&Csr>, Stop> {
-        let worth = space.step || self.tried.load(Ordering::Relaxed) > WORTH * space.edges;
-        if worth && self.edges.get().is_none() {
+        if self.edges.get().is_none() && self.are_worth_storing(space, watch) {
             let memory = space.memory.clone();
             let stored = Csr::new(space, None, &memory, watch).and_then(|edges| edges.reversed(&memory, watch));
             let stored = match stored.and_then(|edges| space.memory.claim(edges.bytes()).map(|()| edges)) {
@@ -60,11 +61,27 @@ impl Against {
         }
         Ok(self.stored())
     }
+
+    /// Whether storing the edges costs less than to do without, and takes neither from this question its time nor from
+    /// later ones the memory that they need for edges of their own.
+    fn are_worth_storing(&self, space: &Space, watch: &Watch<'_>) -> bool {
+        let left = space.memory.limit().saturating_sub(space.memory.used());
+        let has_room = Csr::bytes_of(space).is_some_and(|bytes| left / ROOM >= bytes);
+        // Under steps each question would store them.
+        let is_late = |end: Instant| end.duration_since(Instant::now()).as_secs_f64() < STORING * space.seconds;
+        let pays = self.tried.load(Ordering::Relaxed) > WORTH * space.edges && !watch.deadline().is_some_and(is_late);
+        has_room && (space.step || pays)
+    }
 }
 
 /// As many candidates for each edge of the graph are tried at most before edges are stored, which costs as much as some
 /// three.
 const WORTH: u64 = 6;
+/// As often as stored edges must fit into the memory that is left: twice while they are turned round, and then beside
+/// those of a question that stores its own.
+const ROOM: usize = 6;
+/// How many times as long as the exploration took storing its edges takes at most.
+const STORING: f64 = 4.0;
 
 /// The markings from which a target can be reached, one byte each, targets included; every marking on the way before
 /// the target is in `within`; with `by`, by edges that fire one of these transitions.
@@ -119,10 +136,11 @@ pub fn backward(
                     }
                     false
                 });
+                against.tried.fetch_add(if by.is_none() { fan.tried } else { 0 }, Ordering::Relaxed);
+                fan.tried = 0;
                 watch.tick(taken.len() + edges + transitions.len())?;
             }
         });
-        against.tried.fetch_add(fan.tried, Ordering::Relaxed);
     }
     Ok(reach.to_bytes(space.len()))
 }

@@ -39,6 +39,11 @@ impl Scc {
         Ok(Scc { of, sizes: vec![space.len() as u32], bottom: vec![1], trivial })
     }
 
+    /// Bytes that they take.
+    pub fn bytes(&self) -> usize {
+        4 * (self.of.len() + self.sizes.len()) + self.bottom.len() + self.trivial.len()
+    }
+
     /// The components of stored edges, which stay within a set of markings.
     pub fn of_edges(edges: &Csr, within: Option<&[u8]>, memory: &Memory, watch: &mut Watch<'_>) -> Result<Self, Stop> {
         let (of, count) = pearce(edges, within, memory, watch)?;
