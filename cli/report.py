@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from firable.nets.diagnostics import Diagnostic
     from firable.nets.net import Net
     from firable.nets.text_positions import Positions
-    from firable.nets.verdict import Verdict
+    from firable.nets.verdict import Status, Verdict
 
 VERSION = 1
 _OF_THE_LOOP: Final = frozenset({"loop", "fault", "o4"})
@@ -86,27 +86,33 @@ class Report:
         return self.loop_net if of_loop and self.loop_net is not None else self.net
 
     @property
+    def status(self) -> Status:
+        """What all verdicts say together; evidence without any shows nothing."""
+        from firable.nets.verdict import Status, overall
+
+        return Status.UNKNOWN if self.command == "verify" and not self.verdicts else overall(self.verdicts)
+
+    @property
     def exit_code(self) -> ExitCode:
         """The exit code that these verdicts mean."""
-        from firable.nets.verdict import Status, overall
+        from firable.nets.verdict import Status
 
         codes = {
             Status.PROVED: ExitCode.ALL_HOLD,
             Status.VIOLATED: ExitCode.VIOLATED,
             Status.UNKNOWN: ExitCode.UNKNOWN,
         }
-        return codes[overall(self.verdicts)]
+        return codes[self.status]
 
     def to_json(self) -> dict[str, Any]:
         """The report as JSON data."""
         from firable.nets.interchange import net_digest
-        from firable.nets.verdict import overall
 
         data: dict[str, Any] = {
             "input": self.input,
             "cell": self.net.name,
             "digest": net_digest(self.net),
-            "status": overall(self.verdicts).value,
+            "status": self.status.value,
         }
         if self.table:
             data["table"] = [_row_to_json(row) for row in self.table]

@@ -69,8 +69,9 @@ def verify(
     by z3. Of each it is told how. "shown", or "proved" in JSON, means that the evidence shows it, whether it says that
     something holds or that it is violated; a verdict that nothing shows is "claimed", or "unknown", and told why.
 
-    Exit codes: 0 all that is claimed is shown, 3 some is only claimed, or the time was over, 2 evidence was damaged or
-    edited, is about another net, or does not show what it claims. What a bundle itself leaves undecided claims nothing.
+    Exit codes: 0 all that is claimed is shown, 3 some is only claimed, the time was over, or a document claims nothing,
+    2 evidence was damaged or edited, is about another net, or does not show what it claims. What a bundle itself leaves
+    undecided claims nothing.
     """
     for file in evidence:
         refuse_a_net(file, "what is verified is evidence of one", "firable verify")

@@ -64,6 +64,18 @@ def test_a_report_of_verify_is_as_published(invariant: Path, capsys: pytest.Capt
     assert (report["status"], report["discipline"]) == ("proved", "interleaving")
 
 
+def test_evidence_that_claims_nothing_shows_nothing(
+    invariant: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (file := tmp_path / "nothing.json").write_text(replace(read_document(invariant), records=()).to_text(), "utf-8")
+    assert main(["verify", str(file)]) == 3
+    assert "the document claims nothing" in capsys.readouterr().out
+    assert main(["verify", str(file), str(invariant)]) == 3
+    capsys.readouterr()
+    assert main(["verify", "--format", "json", str(file)]) == 3
+    assert '"status": "unknown"' in capsys.readouterr().out
+
+
 def test_damaged_evidence_is_refused(invariant: Path, capsys: pytest.CaptureFixture[str]) -> None:
     invariant.write_text(invariant.read_text().replace("deadlock", "start", 1))
     assert main(["verify", str(invariant)]) == 2
