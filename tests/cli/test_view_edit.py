@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Dialog, Page, Route, expect
 from support.browser import PATIENCE_MS, browser, command, needs_browser, page_at
+from support.waiting import until
 
 from firable.cli.main import main
 from firable.cli.options import load_net
@@ -43,6 +44,17 @@ transitions:
 properties:
   rests: {always_possible: robot.free}
 """
+
+
+def first_of(page: Page, requests: list[Route]) -> Route:
+    """The first request of a page that was caught: the browser tells of it while somebody waits for the page."""
+
+    def is_told() -> bool:
+        page.wait_for_timeout(10)
+        return bool(requests)
+
+    until(is_told, "a request of the page")
+    return requests[0]
 
 
 @pytest.fixture(scope="module")
@@ -420,8 +432,7 @@ def test_nothing_is_typed_into_a_text_whose_place_another_takes(
         page.get_by_role("button", name="Delete back").click()
         text = page.get_by_label("Text of the net file")
         expect(text).not_to_be_editable()
-        page.wait_for_timeout(50)  # it lets the browser tell of its request
-        answers[0].continue_()
+        first_of(page, answers).continue_()
         done(page, "back deleted")
         expect(text).to_be_editable()
         text.press("Control+End")
@@ -441,8 +452,7 @@ def test_what_is_typed_while_a_text_is_written_is_not_lost(
         text.fill(TEXT + "# one\n")
         page.keyboard.press("Control+s")
         text.fill(TEXT + "# one\n# two\n")
-        page.wait_for_timeout(50)  # it lets the browser tell of its request
-        answers[0].continue_()
+        first_of(page, answers).continue_()
         done(page, "the text")
         assert file.read_text() == TEXT + "# one\n"
         expect(text).to_have_value(TEXT + "# one\n# two\n")
