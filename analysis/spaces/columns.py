@@ -9,7 +9,7 @@ a second text of the firing rule to keep equal.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any, Final
@@ -54,34 +54,21 @@ def unpacked(column: Any) -> Any:
 
 
 NO_COMPONENT: Final = 2**32 - 1
+"""Stands for the component of a marking that is in none."""
 
 
 @dataclass(frozen=True, slots=True)
 class Components:
-    """Strongly connected components: the component of each marking, and for each its size and kind.
-
-    `of` is `NO_COMPONENT` outside the set that was asked for. No edge leaves a `bottom` component; no run can stay in
-    a `trivial` one.
-    """
+    """Strongly connected components of a graph: that of each marking, and which of them no edge leaves."""
 
     of: npt.NDArray[np.uint32]
-    sizes: npt.NDArray[np.uint32]
     bottom: Column
-    trivial: Column
 
     def each_bottom_meets(self, targets: Column) -> bool:
         """Whether each bottom component holds a target."""
         met = np.zeros(len(self.bottom), dtype=np.bool_)
         met[self.of[targets]] = True
         return bool(met[self.bottom].all())
-
-    @property
-    def nontrivial(self) -> Column:
-        """The markings on some cycle within the set."""
-        inside = self.of != NO_COMPONENT
-        found = np.zeros(len(self.of), dtype=np.bool_)
-        found[inside] = ~self.trivial[self.of[inside]]
-        return found
 
 
 def words_of(markings: bytes, words: int) -> npt.NDArray[np.uint64]:
@@ -163,8 +150,3 @@ def first(markings: Column) -> int | None:
     """The lowest marking of a set, which is one nearest to M0; None where the set is empty."""
     index = int(np.argmax(markings)) if len(markings) else 0
     return index if len(markings) and markings[index] else None
-
-
-def indexes(markings: Column) -> Iterator[int]:
-    """The numbers of the markings of a set, ascending."""
-    return (int(i) for i in np.flatnonzero(markings))

@@ -342,12 +342,12 @@ class ReachabilityGraph(Derived["Column"]):
         """For each pair of transitions, whether some marking found makes both firable by Eq. (1)."""
         return tuple(lowest is not None for lowest in self.engine.effective_conflicts(list(pairs), **self._limits))
 
-    def components(self, within: Column | None = None) -> Components:
-        """The strongly connected components of the graph, or of its part within a set of markings."""
+    def components(self) -> Components:
+        """The strongly connected components of the graph."""
         from firable.analysis.spaces.columns import Components, column, numbers
 
-        found = self.engine.components(None if within is None else within.tobytes(), **self._limits)
-        return Components(numbers(found.of()), numbers(found.sizes()), column(found.bottom()), column(found.trivial()))
+        found = self.engine.components(**self._limits)
+        return Components(numbers(found.of()), column(found.bottom()))
 
     def fair_components(self, within: Column, fairness: Fairness) -> npt.NDArray[np.uint32]:
         """For each marking the component in which a fair run can go on for ever inside a set, or `NO_COMPONENT`.

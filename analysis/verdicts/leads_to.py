@@ -147,7 +147,7 @@ class _Walk:
     fired: set[int] = field(default_factory=set)
     visited: list[int] = field(init=False)
     """The markings that it has met, of which `lasting` has not yet been told."""
-    _lasting: set[int] | None = None
+    _lasting: set[int] | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         self.visited = [self.at]

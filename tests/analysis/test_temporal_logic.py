@@ -2,6 +2,7 @@
 
 import random
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -10,7 +11,7 @@ from support.naive_space import Markings, NaiveSpace
 from support.ring_nets import ring_nets
 from support.temporal_formulas import ctl_formulas, ltl_formulas
 
-from firable.analysis.spaces.columns import Column, indexes
+from firable.analysis.spaces.columns import Column
 from firable.analysis.spaces.reachability import ReachabilityGraph, explore
 from firable.analysis.spaces.space import StateSpace
 from firable.analysis.spaces.symbolic import explore_symbolically
@@ -94,7 +95,7 @@ def by_definition(space: NaiveSpace, formula: Temporal) -> Markings:
 
 
 def markings_of(graph: ReachabilityGraph, column: Column) -> Markings:
-    return frozenset(graph.marking(index) for index in indexes(column))
+    return frozenset(graph.markings(np.flatnonzero(column)))
 
 
 @examples(15)
