@@ -80,8 +80,8 @@ def explore(
 class Graph:
     """A reachability graph. Markings are stored, edges are computed again when they are asked for.
 
-    Where `max_memory_bytes` has room for several times the edges they are kept, turned round, once questions that go
-    against them (`backward`) have tried more than it takes to store them; under steps, from the first such question on.
+    Where `max_memory_bytes` has room for several times the edges they are kept, once questions that go against them
+    (`backward`) have tried more than it takes to store them; under steps, from the first such question on.
     """
 
     @property
@@ -196,14 +196,6 @@ class Graph:
 
         Needs the whole graph. Cost: twice that of the exploration at most.
         """
-    def components(
-        self,
-        within: list[int] | bytes | None = None,
-        *,
-        max_seconds: float | None = None,
-        cancelled: Callable[[], bool] | None = None,
-    ) -> Components:
-        """The strongly connected components of the graph, or of the part within a set. Needs the whole graph."""
     def fair(
         self,
         within: list[int] | bytes,
@@ -215,8 +207,8 @@ class Graph:
         """For each marking ("<u4") the number of the component in which a fair run can go on for ever inside a set, or
         2**32 - 1; `fairness` is "none", "weak" or "strong". Needs the whole graph.
 
-        Cost: that of components, and a look at each marking in one that is not a single marking; under strong fairness
-        as often as markings are taken out.
+        Cost: that of storing the edges and finding the components, and a look at each marking in one that is not a
+        single marking; under strong fairness as often as markings are taken out.
         """
     def edges(
         self, *, max_seconds: float | None = None, cancelled: Callable[[], bool] | None = None
@@ -248,21 +240,6 @@ class Graph:
         Whether the two conflict in structure, whether one valuation opens both, and whether more markings may come is
         the caller's question.
         """
-
-@final
-class Components:
-    """Strongly connected components; edges lead from a higher component to a lower one, or stay."""
-
-    def __len__(self) -> int:
-        """How many components there are."""
-    def of(self) -> bytes:
-        """The component of each marking ("<u4"); 2^32 - 1 outside the set that was asked for."""
-    def sizes(self) -> bytes:
-        """The number of markings of each component ("<u4")."""
-    def bottom(self) -> bytes:
-        """One byte for each component: 1 where no edge (within the set) leaves it."""
-    def trivial(self) -> bytes:
-        """One byte for each component: 1 where it has no edge inside, so no run can stay in it."""
 
 def explore_compactly(
     n_places: int,

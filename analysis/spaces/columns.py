@@ -10,7 +10,6 @@ a second text of the firing rule to keep equal.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any, Final
 
@@ -55,20 +54,6 @@ def unpacked(column: Any) -> Any:
 
 NO_COMPONENT: Final = 2**32 - 1
 """Stands for the component of a marking that is in none."""
-
-
-@dataclass(frozen=True, slots=True)
-class Components:
-    """Strongly connected components of a graph: that of each marking, and which of them no edge leaves."""
-
-    of: npt.NDArray[np.uint32]
-    bottom: Column
-
-    def each_bottom_meets(self, targets: Column) -> bool:
-        """Whether each bottom component holds a target."""
-        met = np.zeros(len(self.bottom), dtype=np.bool_)
-        met[self.of[targets]] = True
-        return bool(met[self.bottom].all())
 
 
 def words_of(markings: bytes, words: int) -> npt.NDArray[np.uint64]:

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-    from firable.analysis.spaces.columns import Column, Components, Places, Room
+    from firable.analysis.spaces.columns import Column, Places, Room
 
 __all__ = [
     "Budget",
@@ -325,29 +325,9 @@ class ReachabilityGraph(Derived["Column"]):
         """The home markings: those that can be reached from every reachable marking."""
         return _column(self.engine.home_markings(**self._limits))
 
-    @cached_property
-    def _whole(self) -> Components:
-        """The components of the whole graph, for questions of which there are many."""
-        return self.components()
-
-    def is_always_possible(self, targets: Column) -> bool:
-        """Whether from every marking a target can be reached (AG EF): one is in each bottom component.
-
-        The components are found once, so that many questions cost a look at their markings each.
-        """
-        self.require_complete()
-        return self._whole.each_bottom_meets(targets)
-
     def firable_together(self, pairs: Sequence[tuple[int, int]]) -> Sequence[bool]:
         """For each pair of transitions, whether some marking found makes both firable by Eq. (1)."""
         return tuple(lowest is not None for lowest in self.engine.effective_conflicts(list(pairs), **self._limits))
-
-    def components(self) -> Components:
-        """The strongly connected components of the graph."""
-        from firable.analysis.spaces.columns import Components, column, numbers
-
-        found = self.engine.components(**self._limits)
-        return Components(numbers(found.of()), column(found.bottom()))
 
     def fair_components(self, within: Column, fairness: Fairness) -> npt.NDArray[np.uint32]:
         """For each marking the component in which a fair run can go on for ever inside a set, or `NO_COMPONENT`.

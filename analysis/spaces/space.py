@@ -211,10 +211,6 @@ class StateSpace(Protocol[S]):
         """The home markings: those that can be reached from every reachable marking."""
         ...
 
-    def is_always_possible(self, targets: S) -> bool:
-        """Whether from every marking a target can be reached (AG EF)."""
-        ...
-
     def marked_together(self, pairs: Sequence[tuple[int, int]]) -> Sequence[bool]:
         """For each pair of places, whether some marking found has a token on both."""
         ...
@@ -292,11 +288,6 @@ class Derived(Generic[S]):
         """The home markings: the bottom component, where every marking leads into it."""
         bottom = self.bottom()
         return bottom if self.count(self.backward(bottom)) == self.n_markings else self.algebra.disjunction(())
-
-    def is_always_possible(self: StateSpace[S], targets: S) -> bool:
-        """Whether from every marking a target can be reached (AG EF)."""
-        self.require_complete()
-        return self.count(self.backward(targets)) == self.n_markings
 
     def marked_together(self: StateSpace[S], pairs: Sequence[tuple[int, int]]) -> Sequence[bool]:
         """For each pair of places, whether some marking found has a token on both."""

@@ -2,25 +2,22 @@
 
 Each kind is one temporal pattern over state formulas, with its own method and its own counterexample: `never` and
 `always` by looking at every marking, `reachable` by finding one, `always_possible` (AG EF p) by the backward closure
-of p (of many such properties those that hold by the bottom components, which are found once), `leads_to` by fair
-components (`firable.analysis.verdicts.leads_to`). The shortest firing sequence to a marking that violates the property
-is the evidence; for `reachable` the sequence is the proof. What no pattern says is a formula of CTL or LTL
-(`firable.analysis.temporal`).
+of p, `leads_to` by fair components (`firable.analysis.verdicts.leads_to`). The shortest firing sequence to a marking
+that violates the property is the evidence; for `reachable` the sequence is the proof. What no pattern says is a formula
+of CTL or LTL (`firable.analysis.temporal`).
 """
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
 from firable.analysis.question import Answer, Question, no, yes
 from firable.analysis.spaces.space import StateSpace
 from firable.analysis.temporal.queries import decide_temporal
 from firable.nets.formula import Not, format_formula
-from firable.nets.net import Fairness, Net, Property, PropertyKind, TemporalProperty
+from firable.nets.net import Fairness, Property, PropertyKind, TemporalProperty
 from firable.nets.verdict import Verdict
 
-_FEW: Final = 4
-"""So many closures cost about as much as the bottom components."""
 _FAIRNESS = {
     Fairness.NONE: "without any assumption of fairness",
     Fairness.WEAK: "under weak fairness (a transition that stays firable fires; its external gates do open)",
@@ -94,16 +91,7 @@ def _reachable(space: StateSpace[Any], of: Property) -> Answer:
     return no(hint="no reachable marking satisfies it; the whole state space was searched")
 
 
-def possibilities(net: Net) -> int:
-    """How many properties say that something is always possible."""
-    kinds = (of.kind for of in net.properties if isinstance(of, Property))
-    return sum(kind is PropertyKind.ALWAYS_POSSIBLE for kind in kinds)
-
-
 def _always_possible(space: StateSpace[Any], of: Property) -> Answer:
-    targets = space.satisfying(of.formula)
-    if possibilities(space.net) > _FEW and space.is_always_possible(targets):
-        return yes()
-    lost = space.algebra.negation(space.backward(targets))
+    lost = space.algebra.negation(space.backward(space.satisfying(of.formula)))
     witness = space.witness(lost, f"from here ({format_formula(of.formula)}) can never be reached again")
     return yes() if witness is None else no((), witness)

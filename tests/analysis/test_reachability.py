@@ -43,16 +43,6 @@ def test_columns_agree_with_single_markings(net: Net, discipline: Discipline) ->
     assert list(graph.deadlocks) == [player.deadlocked(m) for m in markings]
 
 
-@examples(50)
-@given(lively_nets(), st.sampled_from(Discipline))
-def test_what_each_bottom_component_meets_is_always_possible(net: Net, discipline: Discipline) -> None:
-    graph = explore(net, discipline)
-    for p in range(len(net.places)):
-        for targets in (graph.marked(p), ~graph.marked(p)):
-            possible = graph.count(graph.backward(targets)) == graph.n_markings
-            assert graph.is_always_possible(targets) is possible
-
-
 def test_columns_do_not_depend_on_the_size_of_their_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     graph = explore(load_net("cell1_mc_late"))
     whole = graph.satisfying(parse_formula("firable(G2) or deadlock"))
@@ -142,8 +132,6 @@ def test_what_needs_the_whole_graph_is_refused_on_a_part() -> None:
     graph = explore(load_net("cell1"), budget=Budget(markings=5))
     with pytest.raises(IncompleteGraph):
         graph.require_complete()
-    with pytest.raises(IncompleteGraph):
-        graph.components()
     with pytest.raises(IncompleteGraph):
         graph.backward(graph.deadlocks)
 

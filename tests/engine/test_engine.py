@@ -126,7 +126,6 @@ def test_a_budget_that_runs_out_is_said_and_nothing_is_concluded_from_the_part()
             graph.live,
             graph.reversible,
             graph.home_markings,
-            graph.components,
             graph.edges,
         ):
             with pytest.raises(_engine.IncompleteGraph, match=reason):
@@ -252,7 +251,6 @@ def test_every_long_question_ends_by_the_clock_and_when_cancelled(step: bool) ->
     never = bytes(graph.n_markings)
     questions: list[Callable[..., object]] = [
         lambda **limits: graph.backward(far, **limits),
-        lambda **limits: lasting().components(**limits),
         lambda **limits: lasting().live(**limits),
         lambda **limits: lasting().reversible(**limits),
         lambda **limits: lasting().home_markings(**limits),
@@ -283,13 +281,11 @@ def test_the_empty_net_has_one_marking_which_is_a_deadlock() -> None:
         True,
     )
     assert graph.find(1) is None
-    assert len(graph.components()) == 1
 
 
 def test_a_transition_without_arcs_is_an_edge_to_the_same_marking() -> None:
     graph = explored(Drawn(1, [([], [], [], [], [])], []), step=False)
     assert (graph.n_markings, graph.n_edges, graph.deadlocks(), graph.live()) == (1, 1, [], [True])
-    assert graph.components().trivial() == b"\0"
 
 
 def test_an_index_that_does_not_exist_is_refused() -> None:

@@ -4,8 +4,9 @@
 //! what waits is taken in the order of the indexes (`Agenda`), so a search against the edges costs about what the
 //! exploration did; fifty times as much where many transitions differ only in what they ask before, as those of a cell with
 //! its machines do, because most of what they come from was never reached. So who asks again and again counts what was
-//! tried, and stores the edges, turned round, before that comes to more (`Against`): a search then costs some ten
-//! nanoseconds an edge.
+//! tried, and before that comes to more than it costs to store the edges, in the middle of a search or between two, they
+//! are stored (`Against`): turned round, where a search stays in a set, and costs some ten nanoseconds an edge then; or as
+//! those of the components, where it goes anywhere (`Condensed`), and costs two or three.
 //!
 //! One step back is asked from whichever side is smaller: the predecessors of few targets are computed, and of many, each
 //! marking looks for one edge into them, of which it usually finds one at once.
@@ -22,7 +23,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use crate::bits::{Agenda, Bits};
-use crate::budget::{Stop, Watch};
+use crate::budget::{Memory, Stop, Watch};
+use crate::condensed::Condensed;
 use crate::csr::Csr;
 use crate::edges::{Edges, Fired};
 use crate::explore::Space;
@@ -30,48 +32,75 @@ use crate::fan::Fan;
 use crate::marking::Width;
 use crate::with_width;
 
-/// The edges of a graph turned round, once they are worth what it takes to store them.
+/// What goes against the edges of a graph, once it is worth what it takes to store it.
 #[derive(Debug, Default)]
 pub struct Against {
     /// How many candidates for a predecessor the table was asked for.
     tried: AtomicU64,
-    /// The edges; none where they do not fit.
+    /// The edges turned round; none where they do not fit.
     edges: OnceLock<Option<Csr>>,
+    /// The components; none where they do not fit.
+    condensed: OnceLock<Option<Condensed>>,
 }
 
 impl Against {
-    /// The edges, if they are stored.
+    /// The edges turned round, if they are stored.
     pub fn stored(&self) -> Option<&Csr> {
         self.edges.get().and_then(Option::as_ref)
     }
 
-    /// The edges, if they are stored or worth it now: their bytes count as held by the graph.
+    /// The edges turned round, if they are stored or worth it now: their bytes count as held by the graph.
     fn edges(&self, space: &Space, watch: &mut Watch<'_>) -> Result<Option<&Csr>, Stop> {
-        if self.edges.get().is_none() && self.are_worth_storing(space, watch) {
+        if self.edges.get().is_none() && self.is_worth_storing(space, watch) {
             let memory = space.memory.clone();
-            let stored = Csr::new(space, None, &memory, watch).and_then(|edges| edges.reversed(&memory, watch));
-            let stored = match stored.and_then(|edges| space.memory.claim(edges.bytes()).map(|()| edges)) {
-                Err(Stop::Memory) => None,
-                edges => Some(edges?),
-            };
-            if let Err(Some(second)) = self.edges.set(stored) {
-                // Somebody has done the same meanwhile.
-                space.memory.release(second.bytes());
-            }
+            let edges = Csr::new(space, None, &memory, watch).and_then(|edges| edges.reversed(&memory, watch));
+            keep(&self.edges, edges, Csr::bytes, space)?;
         }
         Ok(self.stored())
     }
 
+    /// The components, likewise.
+    fn condensed(&self, space: &Space, watch: &mut Watch<'_>) -> Result<Option<&Condensed>, Stop> {
+        if self.condensed.get().is_none() && self.is_worth_storing(space, watch) {
+            let condensed = Condensed::new(space, &space.memory.clone(), watch);
+            keep(&self.condensed, condensed, Condensed::bytes, space)?;
+        }
+        Ok(self.condensed.get().and_then(Option::as_ref))
+    }
+
+    /// Whether more was tried than it costs to store the edges.
+    fn has_tried_enough(&self, space: &Space) -> bool {
+        self.tried.load(Ordering::Relaxed) > WORTH * space.edges
+    }
+
     /// Whether storing the edges costs less than to do without, and takes neither from this question its time nor from
     /// later ones the memory that they need for edges of their own.
-    fn are_worth_storing(&self, space: &Space, watch: &Watch<'_>) -> bool {
+    fn is_worth_storing(&self, space: &Space, watch: &Watch<'_>) -> bool {
         let left = space.memory.limit().saturating_sub(space.memory.used());
         let has_room = Csr::bytes_of(space).is_some_and(|bytes| left / ROOM >= bytes);
         // Under steps each question would store them.
         let is_late = |end: Instant| end.duration_since(Instant::now()).as_secs_f64() < STORING * space.seconds;
-        let pays = self.tried.load(Ordering::Relaxed) > WORTH * space.edges && !watch.deadline().is_some_and(is_late);
+        let pays = self.has_tried_enough(space) && !watch.deadline().is_some_and(is_late);
         has_room && (space.step || pays)
     }
+}
+
+/// Keeps what was stored for later questions, and its bytes as held by the graph; nothing where it does not fit.
+fn keep<T>(
+    place: &OnceLock<Option<T>>,
+    stored: Result<T, Stop>,
+    bytes: impl Fn(&T) -> usize,
+    space: &Space,
+) -> Result<(), Stop> {
+    let stored = match stored.and_then(|stored| space.memory.claim(bytes(&stored)).map(|()| stored)) {
+        Err(Stop::Memory) => None,
+        stored => Some(stored?),
+    };
+    if let Err(Some(second)) = place.set(stored) {
+        // Somebody has done the same meanwhile.
+        space.memory.release(bytes(&second));
+    }
+    Ok(())
 }
 
 /// As many candidates for each edge of the graph are tried at most before edges are stored, which costs as much as some
@@ -94,55 +123,90 @@ pub fn backward(
     watch: &mut Watch<'_>,
 ) -> Result<Vec<u8>, Stop> {
     let memory = space.memory.clone();
-    let mut reach = Bits::from_bytes(targets, &memory)?;
-    let mut agenda = Agenda::new(space.len(), &memory)?;
-    reach.iter().for_each(|index| agenda.add(index));
-    // What still may be added.
-    let open = |reach: &Bits, source: u32| {
-        !reach.has(source as usize) && within.is_none_or(|within| within[source as usize] != 0)
-    };
+    let is_anywhere = within.is_none() && by.is_none();
+    if is_anywhere && let Some(condensed) = against.condensed(space, watch)? {
+        return condensed.backward(targets, &memory, watch);
+    }
+    let mut search = Search::new(space, targets, within, &memory)?;
+    if !is_anywhere
+        && by.is_none()
+        && let Some(edges) = against.edges(space, watch)?
+    {
+        return search.along(edges, watch);
+    }
+    if space.step {
+        let edges = match by {
+            None => Csr::new(space, None, &memory, watch)?,
+            Some(_) => Csr::of_steps(space, one_of(space, by), &memory, watch)?,
+        };
+        return search.along(&edges.reversed(&memory, watch)?, watch);
+    }
+    let transitions = transitions(space, by);
+    let mut fan = Fan::backward(space, watch)?;
     let mut taken = Vec::with_capacity(64);
-    let stored = if by.is_none() { against.edges(space, watch)? } else { None };
-    let own = match by {
-        _ if !space.step || stored.is_some() => None,
-        None => Some(Csr::new(space, None, &memory, watch)?.reversed(&memory, watch)?),
-        Some(_) => Some(Csr::of_steps(space, one_of(space, by), &memory, watch)?.reversed(&memory, watch)?),
-    };
-    if let Some(edges) = stored.or(own.as_ref()) {
-        while agenda.take(&mut taken) {
+    let mut is_storing = by.is_none();
+    with_width!(space.net.words, width => {
+        while search.agenda.take(&mut taken) {
+            let mut edges = 0;
+            fan.load(width, &taken);
+            fan.each(width, !0, transitions.iter().copied(), &mut |_, _, source| {
+                edges += 1;
+                search.meet(source);
+                false
+            });
+            against.tried.fetch_add(if by.is_none() { fan.tried } else { 0 }, Ordering::Relaxed);
+            fan.tried = 0;
+            watch.tick(taken.len() + edges + transitions.len())?;
+            if is_storing && against.has_tried_enough(space) {
+                is_storing = false;
+                if is_anywhere && let Some(condensed) = against.condensed(space, watch)? {
+                    return condensed.backward(targets, &memory, watch);
+                }
+                if !is_anywhere && let Some(edges) = against.edges(space, watch)? {
+                    return search.along(edges, watch);
+                }
+            }
+        }
+    });
+    Ok(search.reach.to_bytes(space.len()))
+}
+
+/// A search against the edges: what it has reached, and what of that it has not looked behind.
+struct Search<'a> {
+    reach: Bits,
+    agenda: Agenda,
+    within: Option<&'a [u8]>,
+}
+
+impl<'a> Search<'a> {
+    fn new(space: &Space, targets: &[u8], within: Option<&'a [u8]>, memory: &Memory) -> Result<Self, Stop> {
+        let reach = Bits::from_bytes(targets, memory)?;
+        let mut agenda = Agenda::new(space.len(), memory)?;
+        reach.iter().for_each(|index| agenda.add(index));
+        Ok(Search { reach, agenda, within })
+    }
+
+    /// A marking has an edge to one that was reached.
+    fn meet(&mut self, source: u32) {
+        let source = source as usize;
+        if !self.reach.has(source) && self.within.is_none_or(|within| within[source] != 0) {
+            self.reach.add(source);
+            self.agenda.add(source);
+        }
+    }
+
+    /// Goes on along edges that are turned round, to the end.
+    fn along(mut self, edges: &Csr, watch: &mut Watch<'_>) -> Result<Vec<u8>, Stop> {
+        let mut taken = Vec::with_capacity(64);
+        while self.agenda.take(&mut taken) {
             for &index in &taken {
                 let sources = edges.targets(index);
-                for &source in sources {
-                    if open(&reach, source) {
-                        reach.add(source as usize);
-                        agenda.add(source as usize);
-                    }
-                }
+                sources.iter().for_each(|&source| self.meet(source));
                 watch.tick(1 + sources.len())?;
             }
         }
-    } else {
-        let transitions = transitions(space, by);
-        let mut fan = Fan::backward(space, watch)?;
-        with_width!(space.net.words, width => {
-            while agenda.take(&mut taken) {
-                let mut edges = 0;
-                fan.load(width, &taken);
-                fan.each(width, !0, transitions.iter().copied(), &mut |_, _, source| {
-                    edges += 1;
-                    if open(&reach, source) {
-                        reach.add(source as usize);
-                        agenda.add(source as usize);
-                    }
-                    false
-                });
-                against.tried.fetch_add(if by.is_none() { fan.tried } else { 0 }, Ordering::Relaxed);
-                fan.tried = 0;
-                watch.tick(taken.len() + edges + transitions.len())?;
-            }
-        });
+        Ok(self.reach.to_bytes(edges.offsets.len() - 1))
     }
-    Ok(reach.to_bytes(space.len()))
 }
 
 /// These transitions, or all.

@@ -22,6 +22,8 @@ pub mod budget;
 #[forbid(unsafe_code)]
 pub mod compact;
 #[forbid(unsafe_code)]
+pub mod condensed;
+#[forbid(unsafe_code)]
 pub mod csr;
 #[forbid(unsafe_code)]
 pub mod edges;
@@ -91,8 +93,6 @@ mod extension {
 
     #[pymodule_export]
     use crate::python::compact::{Compact, explore_compactly};
-    #[pymodule_export]
-    use crate::python::components::Components;
     #[pymodule_export]
     use crate::python::diagram::Diagram;
     #[pymodule_export]

@@ -25,20 +25,6 @@ pub struct Scc {
 }
 
 impl Scc {
-    /// The components of the graph, or of its part within a set of markings.
-    pub fn new(space: &Space, within: Option<&[u8]>, watch: &mut Watch<'_>) -> Result<Self, Stop> {
-        let memory = space.memory.clone();
-        let edges = Csr::new(space, within, &memory, watch)?;
-        Scc::of_edges(&edges, within, &memory, watch)
-    }
-
-    /// All markings as one component.
-    pub fn whole(space: &Space) -> Result<Self, Stop> {
-        let of = space.memory.clone().filled(0, space.len())?;
-        let trivial = vec![u8::from(space.edges == 0)];
-        Ok(Scc { of, sizes: vec![space.len() as u32], bottom: vec![1], trivial })
-    }
-
     /// Bytes that they take.
     pub fn bytes(&self) -> usize {
         4 * (self.of.len() + self.sizes.len()) + self.bottom.len() + self.trivial.len()

@@ -1,12 +1,11 @@
 //! `Graph`: a reachability graph, its figures, and the questions that are asked of it.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
 
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyInt};
 
-use super::components::Components;
 use super::{IncompleteGraph, Patience, answered, little_endian, marking_of, mask};
 use crate::bottoms::Bottoms;
 use crate::budget::{Memory, Stop, Watch};
@@ -15,7 +14,6 @@ use crate::edges::Edges;
 use crate::explore::Space;
 use crate::fairness::Fairness;
 use crate::fixpoints::Against;
-use crate::scc::Scc;
 use crate::table::NONE;
 use crate::{fairness, fixpoints, paths};
 
@@ -23,7 +21,6 @@ use crate::{fairness, fixpoints, paths};
 #[pyclass(frozen, module = "firable.analysis._engine")]
 pub(crate) struct Graph {
     space: Space,
-    scc: OnceLock<Arc<Scc>>,
     bottoms: OnceLock<Bottoms>,
     against: Against,
     /// Bytes held when the exploration ended.
@@ -40,7 +37,7 @@ enum Markings<'py> {
 impl Graph {
     pub(crate) fn new(space: Space) -> Self {
         let explored_bytes = space.memory.used();
-        Graph { space, scc: OnceLock::new(), bottoms: OnceLock::new(), against: Against::default(), explored_bytes }
+        Graph { space, bottoms: OnceLock::new(), against: Against::default(), explored_bytes }
     }
 
     fn long<T: Send>(
@@ -105,16 +102,6 @@ impl Graph {
         }
         let bottoms = self.long(py, patience, Bottoms::new)?;
         Ok(self.bottoms.get_or_init(|| bottoms))
-    }
-
-    fn scc(&self, py: Python<'_>, patience: &Patience) -> PyResult<Arc<Scc>> {
-        if let Some(scc) = self.scc.get() {
-            return Ok(Arc::clone(scc));
-        }
-        let one = self.bottoms(py, patience)?.reversible;
-        let scc =
-            self.long(py, patience, |space, watch| if one { Scc::whole(space) } else { Scc::new(space, None, watch) })?;
-        Ok(Arc::clone(self.scc.get_or_init(|| Arc::new(scc))))
     }
 }
 
@@ -282,26 +269,14 @@ impl Graph {
         let targets = self.bitmap(targets)?;
         let within = within.map(|within| self.bitmap(within)).transpose()?;
         let by = by.map(|by| self.check_transitions(by)).transpose()?;
+        let is_one = self.bottoms.get().is_some_and(|bottoms| bottoms.reversible);
+        if is_one && within.is_none() && by.is_none() && targets.iter().any(|&target| target != 0) {
+            return Ok(PyBytes::new(py, &vec![1; targets.len()]));
+        }
         let reach = self.long(py, &patience, |space, watch| {
             fixpoints::backward(space, &targets, within.as_deref(), by.as_deref(), &self.against, watch)
         })?;
         Ok(PyBytes::new(py, &reach))
-    }
-
-    #[pyo3(signature = (within=None, *, max_seconds=None, cancelled=None))]
-    fn components(
-        &self,
-        py: Python<'_>,
-        within: Option<Markings<'_>>,
-        max_seconds: Option<f64>,
-        cancelled: Option<Py<PyAny>>,
-    ) -> PyResult<Components> {
-        let patience = Patience::new(max_seconds, cancelled)?;
-        let Some(within) = within else { return Ok(Components { scc: self.scc(py, &patience)? }) };
-        self.whole("strongly connected components")?;
-        let within = self.bitmap(within)?;
-        let scc = self.long(py, &patience, |space, watch| Scc::new(space, Some(&within), watch))?;
-        Ok(Components { scc: Arc::new(scc) })
     }
 
     #[pyo3(signature = (within, fairness, *, max_seconds=None, cancelled=None))]

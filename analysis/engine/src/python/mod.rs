@@ -7,7 +7,6 @@
 //! `BudgetExceeded`.
 
 pub(crate) mod compact;
-pub(crate) mod components;
 pub(crate) mod diagram;
 pub(crate) mod explore;
 pub(crate) mod graph;
