@@ -363,7 +363,7 @@ class _Check:
         """The report with those of its unknown verdicts settled that can be.
 
         The knowers, each with its part of the time, are asked only as long as something is open; the time left is
-        shared out among the verdicts that come down to goals.
+        shared out among the verdicts that come down to goals, and what these leave is for knowers that go on.
         """
 
         def open_() -> list[Verdict]:
@@ -379,6 +379,8 @@ class _Check:
         for left, verdict in zip(range(len(waiting), 0, -1), waiting, strict=True):
             settling.ask(verdict, fired, lanes, _share(self.deadline, 1 / left), slices_seconds)
             settling.conclude(report.verdicts)
+        settling.learn_on({verdict.name for verdict in open_()}, _moment(self.deadline, 1.0))
+        settling.conclude(report.verdicts)
         verdicts = tuple(
             settling.found.get(verdict.name, verdict) if verdict.status is Status.UNKNOWN else verdict
             for verdict in report.verdicts

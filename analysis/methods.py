@@ -3,7 +3,7 @@
 To add one: its file, which opens with the idea and its source, and one row here. A technique either *holds* all
 markings, so that every verdict may be asked of it, or decides *goals*, or *knows* some verdicts at once from the
 structure of the net, or decides *formulas* of a temporal logic. They are loaded when they are used, because solvers
-take a second to load.
+take a second to load. Who knows may be asked twice, and may go on then where the time had ended.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 
@@ -26,7 +27,7 @@ if TYPE_CHECKING:  # the command line reads this table for its help, and so load
 
     GoalDecider = Callable[[Net, Formula, Limits], Finding]
     SpaceMaker = Callable[[Net, Limits], StateSpace[Any]]
-    Knower = Callable[[Net, Limits], Mapping[str, Known]]
+    Knower = Callable[[Net], Callable[[Limits], Mapping[str, Known]]]
     FormulaDecider = Callable[[Net, Temporal, Limits], Known]
 
 
@@ -67,20 +68,30 @@ class Technique(Generic[F]):
         return function
 
 
+@dataclass(frozen=True, slots=True)
+class Anew(Technique["Knower"]):
+    """A technique that knows, and begins anew each time that it is asked: a function of the net and the limits."""
+
+    def load(self) -> Knower:
+        """What makes of a net what is asked with limits."""
+        module, _, name = self.at.partition(":")
+        return partial(partial, getattr(import_module(module), name))
+
+
 SPACES: Final[dict[Method, Technique[SpaceMaker]]] = {
     Method.SYMBOLIC: Technique("decision diagram", "firable.analysis.spaces.symbolic:explore_symbolically"),
 }
 
 KNOWERS: Final[dict[Method, Technique[Knower]]] = {
-    Method.STRUCTURE: Technique("theorems on net classes", "firable.analysis.structure.theorems:decide_by_class"),
+    Method.STRUCTURE: Anew("theorems on net classes", "firable.analysis.structure.theorems:decide_by_class"),
     Method.REDUCTION: Technique(
-        "walks and projections of the reduced net, at large", "firable.analysis.reduction.deciding:known_by_reduction"
+        "walks and projections of the reduced net, at large", "firable.analysis.reduction.deciding:KnownByReduction"
     ),
-    Method.STUBBORN_SETS: Technique("stubborn sets, at large", "firable.analysis.stubborn:known_firings"),
-    Method.PROJECTION: Technique(
+    Method.STUBBORN_SETS: Anew("stubborn sets, at large", "firable.analysis.stubborn:known_firings"),
+    Method.PROJECTION: Anew(
         "projections, one transition after the other", "firable.analysis.projection.refining:known_by_projection"
     ),
-    Method.COMPACT: Technique("compact search of all markings", "firable.analysis.compact:known_by_counting"),
+    Method.COMPACT: Anew("compact search of all markings", "firable.analysis.compact:known_by_counting"),
 }
 
 WORTH_ASKING: Final[dict[Method, frozenset[str]]] = {

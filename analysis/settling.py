@@ -23,7 +23,7 @@ from typing import Final
 from firable.analysis._engine import IncompleteGraph
 from firable.analysis.deadline import Deadline
 from firable.analysis.goal import DEPTH_MAX, Finding, Limits
-from firable.analysis.methods import FORMULAS, GOALS, KNOWERS, WORTH_ASKING, Method
+from firable.analysis.methods import FORMULAS, GOALS, KNOWERS, WORTH_ASKING, Anew, Method
 from firable.analysis.question import Answer, Known, Question, no, yes
 from firable.analysis.race import SLICES_SECONDS, Contestant, Outcome, T, race
 from firable.analysis.spaces.space import WitnessError
@@ -74,6 +74,8 @@ class Settling:
     course: list[str] = field(default_factory=list)
     findings: dict[str, list[tuple[Formula, Finding]]] = field(default_factory=dict)
     reached: dict[str, str] = field(default_factory=dict)
+    _knowing: dict[Method, Callable[[Limits], Mapping[str, Known]]] = field(default_factory=dict)
+    """Who was asked already what they know."""
 
     def shown(self) -> dict[str, Verdict]:
         """What was found but formulas of CTL that nothing shows: sets of markings give a run for most of these."""
@@ -90,7 +92,9 @@ class Settling:
             return
         began = perf_counter()
         try:
-            known = KNOWERS[of].load()(self.net, Limits(deadline, self.memory_bytes))
+            if of not in self._knowing:
+                self._knowing[of] = KNOWERS[of].load()(self.net)
+            known = self._knowing[of](Limits(deadline, self.memory_bytes))
         except KeyboardInterrupt:
             self.interrupted.set()
             return
@@ -99,6 +103,12 @@ class Settling:
             self.course.append(f"{KNOWERS[of].words}: {', '.join(said)}")
         for name in said:
             self._settle(_QUESTIONS[name], known[name].answer, known[name].method, cost)
+
+    def learn_on(self, among: Collection[str], deadline: Deadline) -> None:
+        """Ask those again who go on where they were ended, with time that nobody else has a use for."""
+        for of in list(self._knowing):
+            if not isinstance(KNOWERS[of], Anew):
+                self.learn(of, among, deadline)
 
     def conclude(self, verdicts: Iterable[Verdict]) -> None:
         """Add what follows from these verdicts and those that were found."""

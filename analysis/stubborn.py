@@ -229,7 +229,7 @@ def find_firings(net: Net, limits: Limits, original: Net | None = None) -> Firin
     >>> found.dead, found.undecided, found.witness("t").firings
     (('u',), (), (('t',),))
     """
-    return _Firings(_Runs(net, limits), net if original is None else original).found()
+    return FiringSearch(net, original).found(limits)
 
 
 def known_firings(net: Net, limits: Limits) -> Mapping[str, Known]:
@@ -240,31 +240,39 @@ def known_firings(net: Net, limits: Limits) -> Mapping[str, Known]:
     return find_firings(net, limits).known()
 
 
-class _Firings:
-    """The search for firings: what is open, and what is known."""
+class FiringSearch:
+    """The search of `find_firings`: what is open, and what is known. Asked again it goes on where it was ended."""
 
-    def __init__(self, runs: _Runs, original: Net) -> None:
-        self.runs, self.original = runs, original
-        self.replay = _Replay(runs.net, original)
-        self.open = set(range(len(runs.net.transitions)))
+    def __init__(self, net: Net, original: Net | None = None) -> None:
+        self.original = net if original is None else original
+        self.runs = _Runs(net, Limits())
+        self.replay = _Replay(net, self.original)
+        self.open = set(range(len(net.transitions)))
         self.ways: list[Way] = []
         self.fires: dict[int, Moment] = {}
         self.dead: set[int] = set()
         self.deadlock: tuple[int, ...] | None = None
-        self.projections = Projections(runs.net, runs.limits)
+        self.projections = Projections(net, self.runs.limits)
         self.closed_by: dict[str, None] = {}
         self.dead_by: dict[str, None] = {}
+        self.budget, self.turn = _TOGETHER_FIRST, 0
 
-    def found(self) -> Firings:
-        budget, bound, turn = _TOGETHER_FIRST, "", 0
+    def found(self, limits: Limits) -> Firings:
+        """What was found by the end of these limits."""
+        self.runs.limits = self.projections.limits = limits
+        bound = ""
         while self.open and not bound:
+            turn, budget = self.turn, self.budget
             self._by(WALKS, partial(self._walk, turn))
             if self.open and not (turn > 0 and self._by(PROJECTION, partial(self._project, turn))):
                 if turn > 0:
                     self._by(EQUATION, partial(self._refute, turn))
                 bound = self._by(METHOD, partial(self._round, budget, one_by_one=turn > 0)) if self.open else ""
-                budget = min(4 * budget, _MARKINGS_MAX)
-            turn += 1
+                if bound:
+                    break  # the same turn once more, if there is another time
+                self.budget = min(4 * budget, _MARKINGS_MAX)
+            self.turn += 1
+        self.projections.forget()
         names = self.runs.net.transitions
         dead, undecided = (tuple(names[t].name for t in sorted(of)) for of in (self.dead, self.open))
         return Firings(

@@ -194,6 +194,10 @@ class Projections:
         """The same for the goal that a transition may fire."""
         return self.decide(nodes_of(self.net, Firable(self.net.transitions[t].name)))
 
+    def forget(self) -> None:
+        """Hold no markings any more; what they have shown is kept."""
+        self._explored.clear()
+
     def _on(self, kept: Marking) -> Explored:
         """The projection to these places, with all its markings."""
         if self._too_large.get(kept) == self.room:
@@ -203,7 +207,8 @@ class Projections:
             try:
                 found = explored(projection(self.net, kept), limits, self.room)
             except BudgetExceeded:
-                self._too_large[kept] = self.room
+                if not self.limits.deadline.over:
+                    self._too_large[kept] = self.room
                 self.markings += self.room.markings
                 raise
             self.markings += found.space.n_markings

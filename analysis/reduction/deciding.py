@@ -21,9 +21,9 @@ from firable.analysis.goal import Finding, Limits
 from firable.analysis.question import Known, no
 from firable.analysis.race import Contestant, race
 from firable.analysis.reduction.components import parts
-from firable.analysis.reduction.reduce import reduce_for_goal, reduce_for_liveness
+from firable.analysis.reduction.reduce import ReducedTransitions, reduce_for_goal, reduce_for_liveness
 from firable.analysis.spaces.symbolic import explore_symbolically
-from firable.analysis.stubborn import decide_by_stubborn_sets, find_firings
+from firable.analysis.stubborn import FiringSearch, decide_by_stubborn_sets
 from firable.analysis.walk import decide_by_walk
 from firable.nets.formula import Constant, Formula
 from firable.nets.net import Net
@@ -142,25 +142,36 @@ def decide_by_diagram(net: Net, goal: Formula, limits: Limits) -> Finding:
     return Finding(reachable, DIAGRAM, witness, cost=cost)
 
 
-def known_by_reduction(net: Net, limits: Limits) -> Mapping[str, Known]:
+class KnownByReduction:
     """The verdicts, by name, that the net reduced for liveness decides: dead transitions, and what walks meet in it.
 
-    What fires in it is replayed in the original net. Cost: three quarters of the time for the reduction at most.
+    What fires in it is replayed in the original net. Asked again, the search goes on where it was ended. Cost: three
+    quarters of the time for the reduction at most.
     """
-    left = limits.deadline.left_seconds
-    until = limits.deadline if left is None else limits.deadline.within(left * _REDUCING_SHARE)
-    try:
-        reduced = reduce_for_liveness(net, replace(limits, deadline=until))
-    except BudgetExceeded:
-        return {}
-    if dead := tuple(name for name, image in reduced.transitions.items() if image is None):
-        return {name: Known(no(dead), f"structural {reduced.summary}") for name in ("quasi-live", "live")}
-    firings = find_firings(reduced.net, limits, net)
-    found = firings.known()
-    if firings.dead:
-        dead = tuple(name for name, image in reduced.transitions.items() if image in firings.dead)
-        found["quasi-live"] = Known(no(dead), found["quasi-live"].method)
-    return {name: replace(known, method=f"{known.method}, after {reduced.summary}") for name, known in found.items()}
+
+    def __init__(self, net: Net) -> None:
+        self.net = net
+        self._begun: tuple[ReducedTransitions, FiringSearch] | None = None
+
+    def __call__(self, limits: Limits) -> Mapping[str, Known]:
+        """What is decided by the end of these limits."""
+        if self._begun is None:
+            left = limits.deadline.left_seconds
+            until = limits.deadline if left is None else limits.deadline.within(left * _REDUCING_SHARE)
+            try:
+                reduced = reduce_for_liveness(self.net, replace(limits, deadline=until))
+            except BudgetExceeded:
+                return {}
+            self._begun = reduced, FiringSearch(reduced.net, self.net)
+        reduced, search = self._begun
+        if dead := tuple(name for name, image in reduced.transitions.items() if image is None):
+            return {name: Known(no(dead), f"structural {reduced.summary}") for name in ("quasi-live", "live")}
+        firings = search.found(limits)
+        known = firings.known()
+        if firings.dead:
+            dead = tuple(name for name, image in reduced.transitions.items() if image in firings.dead)
+            known["quasi-live"] = Known(no(dead), known["quasi-live"].method)
+        return {name: replace(one, method=f"{one.method}, after {reduced.summary}") for name, one in known.items()}
 
 
 def _sum(costs: Iterable[Cost]) -> Cost:

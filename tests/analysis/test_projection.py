@@ -212,6 +212,12 @@ def test_a_projection_without_room_is_not_explored_again_until_there_is_more(mon
         with pytest.raises(BudgetExceeded):
             search.decide(goal)
     assert asked == [Room(3, 0), Room(4, 0)]
+    search.room, search.limits = Room(5, 0), Limits(Deadline.after(0))
+    for limits in (search.limits, Limits()):  # what had no time may have room
+        search.limits = limits
+        with pytest.raises(BudgetExceeded):
+            search.decide(goal)
+    assert asked[2:] == 2 * [Room(5, 0)]
 
 
 def test_what_is_too_large_is_left_undecided_and_says_how_many_places_were_kept() -> None:
@@ -247,8 +253,8 @@ def test_transitions_are_found_dead_and_firing_by_projections_alone(monkeypatch:
         Transition("loop", ("p3.eating",), ("p3.eating",)),
     )
     net = replace(net, transitions=(*net.transitions, *dead))
-    monkeypatch.setattr(stubborn._Firings, "_walk", lambda *_: None)
-    monkeypatch.setattr(stubborn._Firings, "_round", lambda *_, **__: "")
+    monkeypatch.setattr(stubborn.FiringSearch, "_walk", lambda *_: None)
+    monkeypatch.setattr(stubborn.FiringSearch, "_round", lambda *_, **__: "")
     found = find_firings(net, Limits())
     assert (found.dead, found.undecided) == (("both", "read", "loop"), ())
     for transition in net.transitions[: -len(dead)]:
@@ -263,7 +269,7 @@ def test_transitions_are_found_dead_and_firing_by_projections_alone(monkeypatch:
 def test_what_a_stage_closes_is_so(stage: str, net: Net) -> None:
     player = Player(net)
     fires = {t for marking in player.reachable() for t in player.may_fire(marking)}
-    search = stubborn._Firings(stubborn._Runs(net, Limits()), net)
+    search = stubborn.FiringSearch(net)
     for turn in range(1, 1 + len(net.transitions)):
         if search.open:
             getattr(search, stage)(turn)
@@ -277,8 +283,8 @@ def test_what_a_stage_closes_is_so(stage: str, net: Net) -> None:
 def test_the_methods_are_told_that_closed_transitions(monkeypatch: pytest.MonkeyPatch) -> None:
     net = family_net("philosophers_either-10")
     assert find_firings(net, Limits()).known()["quasi-live"].method == "random walks"
-    monkeypatch.setattr(stubborn._Firings, "_walk", lambda *_: None)
-    monkeypatch.setattr(stubborn._Firings, "_round", lambda *_, **__: "")
+    monkeypatch.setattr(stubborn.FiringSearch, "_walk", lambda *_: None)
+    monkeypatch.setattr(stubborn.FiringSearch, "_round", lambda *_, **__: "")
     assert find_firings(net, Limits()).known()["quasi-live"].method == "projections"
 
 
@@ -288,8 +294,8 @@ def test_what_few_tokens_make_dead_is_found_by_the_state_equation_alone(monkeypa
     net = replace(
         net, transitions=(*net.transitions, *(Transition(f"t{i}", eating, (f"p{i}.left",)) for i in range(6, 9)))
     )
-    monkeypatch.setattr(stubborn._Firings, "_project", lambda *_: False)
-    monkeypatch.setattr(stubborn._Firings, "_ask", lambda *_, **__: "")
+    monkeypatch.setattr(stubborn.FiringSearch, "_project", lambda *_: False)
+    monkeypatch.setattr(stubborn.FiringSearch, "_ask", lambda *_, **__: "")
     found = find_firings(net, Limits())
     assert (found.dead, found.undecided) == (("t6", "t7", "t8"), ())
     assert found.known()["quasi-live"].method == "state equation and traps"

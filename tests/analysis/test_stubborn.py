@@ -85,6 +85,46 @@ def test_exactly_the_transitions_that_fire_in_the_whole_graph_are_found_firing(n
             played(net, witness)
 
 
+class _AfterSoMany(Event):
+    """A flag that is set as soon as so many have asked whether it is."""
+
+    def __init__(self, calm: int) -> None:
+        super().__init__()
+        self.calm = calm
+
+    def is_set(self) -> bool:
+        self.calm -= 1
+        return self.calm < 0
+
+
+@pytest.mark.parametrize("calm", range(12))
+def test_a_search_for_firings_that_was_ended_goes_on(calm: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    net = philosophers_either(8)
+    everywhere = tuple(place.name for place in net.places)
+    net = replace(net, transitions=(*net.transitions, Transition("never", everywhere)))
+    for other in ("_project", "_refute"):  # these need no search to see that so many places are never full together
+        monkeypatch.setattr(stubborn.FiringSearch, other, lambda *_: False)
+    turns, walk = list[int](), stubborn.FiringSearch._walk
+
+    def walked(search: stubborn.FiringSearch, turn: int) -> None:
+        turns.append(turn)
+        walk(search, turn)
+
+    monkeypatch.setattr(stubborn.FiringSearch, "_walk", walked)
+    search = stubborn.FiringSearch(net)
+    ended, before = search.found(Limits(Deadline(cancelled=_AfterSoMany(calm)))), len(turns)
+    assert "never" in ended.undecided
+    assert "no longer needed" in ended.bound
+    found = search.found(Limits())
+    assert (found.dead, found.undecided) == (("never",), ())
+    assert turns[before] == turns[before - 1], "it goes on with the turn in which it was ended"
+    assert turns == sorted(turns)
+    for transition in net.transitions[:-1]:
+        witness = found.witness(transition.name)
+        assert witness is not None
+        played(net, witness)
+
+
 def test_what_fires_for_ever_and_changes_nothing_holds_nobody_up() -> None:
     net = Net("idle", (Place("p"),), (Transition("idle"), Transition("dead", ("p",))))
     found = find_firings(net, Limits())
@@ -222,7 +262,7 @@ def test_a_budget_that_ends_leaves_the_question_open_and_says_how_far_it_came(
     assert why in deadlocks.bound
     stuck = replace(net, transitions=(*net.transitions, Transition("never", tuple(p.name for p in net.places))))
     for other in ("_project", "_refute"):  # these need no search to see that so many places are never full together
-        monkeypatch.setattr(stubborn._Firings, other, lambda *_: False)
+        monkeypatch.setattr(stubborn.FiringSearch, other, lambda *_: False)
     firings = find_firings(stuck, limits)
     assert "never" in firings.undecided
     assert why in firings.bound

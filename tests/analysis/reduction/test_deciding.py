@@ -21,12 +21,14 @@ from firable.analysis.goal import Finding, Limits
 from firable.analysis.reduction import deciding
 from firable.analysis.reduction.components import parts
 from firable.analysis.reduction.deciding import (
+    KnownByReduction,
     decide_by_diagram,
     decide_by_reduction,
     decide_reduced,
-    known_by_reduction,
 )
+from firable.analysis.reduction.reduce import ReducedTransitions, reduce_for_liveness
 from firable.analysis.spaces.space import WitnessError, Witnesses
+from firable.analysis.stubborn import Firings, FiringSearch
 from firable.nets.catalogue import catalogue_net
 from firable.nets.catalogue.processes import machines, philosophers
 from firable.nets.formula import And, Deadlock, Formula, Holds, Not, parse_formula
@@ -206,7 +208,7 @@ def test_what_is_known_on_the_reduced_net_holds_of_the_original(chunk: int) -> N
     for seed in range(40 * chunk, 40 * (chunk + 1)):
         net = lively_net(random.Random(seed), 9)
         report = check(net, method="explicit")
-        for name, of in known_by_reduction(net, Limits()).items():
+        for name, of in KnownByReduction(net)(Limits()).items():
             verdict = report.verdict(name)
             assert of.answer.holds is (verdict.status is Status.PROVED)
             assert set(of.answer.subjects) <= set(verdict.subjects)
@@ -252,4 +254,25 @@ def test_a_net_that_was_not_read_in_time_is_left_undecided() -> None:
     found = decide_by_reduction(wide, Deadlock(), late)
     assert found.reachable is None
     assert found.bound == "the time was over before the net was read for its reduction"
-    assert known_by_reduction(wide, late) == {}
+    assert KnownByReduction(wide)(late) == {}
+
+
+def test_a_net_that_was_reduced_once_is_searched_on_and_not_reduced_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    net, reduced, asked = philosophers(5), list[str](), list[tuple[FiringSearch, Limits]]()
+    found = FiringSearch.found
+
+    def counted(net: Net, limits: Limits) -> ReducedTransitions:
+        reduced.append(net.name)
+        return reduce_for_liveness(net, limits)
+
+    def noted(search: FiringSearch, limits: Limits) -> Firings:
+        asked.append((search, limits))
+        return found(search, limits)
+
+    monkeypatch.setattr(deciding, "reduce_for_liveness", counted)
+    monkeypatch.setattr(FiringSearch, "found", noted)
+    knower, looks = KnownByReduction(net), [Limits(depth_max=1), Limits(depth_max=2)]
+    known = [knower(limits) for limits in looks][-1]
+    assert known["quasi-live"].answer.holds
+    assert reduced == [net.name]
+    assert asked == [(asked[0][0], limits) for limits in looks]
