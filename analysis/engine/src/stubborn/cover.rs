@@ -3,7 +3,8 @@
 //! A walk that has made an open transition firable has come to a part of the net where others wait; so the way there is
 //! kept, cut down to the firings that it needs, and later walks start from there as often as from M0 (the archive of
 //! Ecoffet and others, "First return, then explore", 2021). A third of the walks are drawn towards one open transition
-//! by relaxed plans; a third fire what was fired least; a third are blind. A deadlock that is met on the way is kept too.
+//! by relaxed plans; a third fire what was fired least; a third are blind. Plans are strict, with as many tokens at rest as
+//! can be (`Plan::freeze`), as long as making them takes no longer than walking. A deadlock that is met on the way is kept.
 //!
 //! What comes out is a tree of firing sequences, each of which goes on from a moment of another: what a walk has met is
 //! shown by one sequence, cut down to what all of it needs, so that all together are replayed in the time that their
@@ -76,10 +77,17 @@ struct Search<'a> {
     random: Random,
     /// Whether no firing in M0 leads to another marking.
     nowhere_to_go: bool,
+    /// The work of walking, and of planning strictly.
+    walked: usize,
+    planned: usize,
     found: Cover,
 }
 
 const CLOSED: u32 = u32::MAX;
+/// How often is drawn what a walk goes towards.
+const TRIES: usize = 8;
+/// How many times as much as walking takes, planning strictly may take.
+const PLANNING: usize = 1;
 
 impl<'a> Search<'a> {
     fn new(net: &'a Net, dependencies: &'a Dependencies, open: &[u32], seed: u64) -> Self {
@@ -94,6 +102,8 @@ impl<'a> Search<'a> {
             plan: Plan::new(dependencies, net.places, count),
             random: Random::new(seed),
             nowhere_to_go: false,
+            walked: 0,
+            planned: 0,
             found: Cover::default(),
         };
         for &t in open.iter().filter(|&&t| dependencies.able(t)) {
@@ -145,6 +155,7 @@ impl<'a> Search<'a> {
         let (mut path, mut met) = (Vec::new(), Vec::new());
         self.meet(&walker, &walker.firable, 0, &mut met);
         self.plan.forget();
+        let strict = self.planned <= PLANNING * self.walked;
         while path.len() < length && !self.open.is_empty() {
             if walker.stuck() {
                 self.nowhere_to_go |= from == 0 && path.is_empty();
@@ -161,17 +172,20 @@ impl<'a> Search<'a> {
                 0 => self.least_fired(&walker),
                 1 => {
                     if !self.plan.is_fresh() {
-                        let target = self.open[self.random.below(self.open.len())];
-                        work = self.plan.size();
-                        if !self.plan.towards(&walker, self.dependencies.conditions(target), &mut self.random) {
+                        let (is_planned, more) = self.aim(&walker, strict, path.is_empty());
+                        if !is_planned {
+                            watch.tick(more)?;
                             break;
                         }
+                        work = more;
                     }
                     self.plan.follow(&walker, &mut self.random)
                 }
                 _ => walker.firable[self.random.below(walker.firable.len())],
             };
-            work += walker.flip(t);
+            let walked = walker.flip(t);
+            self.walked += walked;
+            work += walked;
             path.push(t);
             self.fired[t as usize] = self.fired[t as usize].saturating_add(1);
             self.found.steps += 1;
@@ -183,6 +197,27 @@ impl<'a> Search<'a> {
         }
         self.keep(from, &path, &met);
         Ok(())
+    }
+
+    /// Plans a way to an open transition that is drawn, in a strict walk with as many tokens at rest as could be at its
+    /// beginning; whether there is one, and the work.
+    fn aim(&mut self, walker: &Walker<'_>, strict: bool, is_first: bool) -> (bool, usize) {
+        let mut work = 0;
+        for _ in 0..if strict { TRIES } else { 1 } {
+            let target = self.open[self.random.below(self.open.len())];
+            let goal = self.dependencies.conditions(target);
+            let (is_planned, more) = if strict && is_first {
+                self.plan.freeze(&walker.marking, goal, &mut self.random)
+            } else {
+                (self.plan.towards(walker, goal, &mut self.random), self.plan.size())
+            };
+            work += more;
+            self.planned += if strict { more } else { 0 };
+            if is_planned {
+                return (true, work);
+            }
+        }
+        (false, work)
     }
 
     fn least_fired(&mut self, walker: &Walker<'_>) -> u32 {
