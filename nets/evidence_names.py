@@ -27,8 +27,8 @@ def named_as_proved(text: str, net: Net, discipline: str) -> frozenset[str]:
 
     try:
         data: Any = json.loads(text)
-        about = (data["firable_evidence"], data["discipline"], data["digest"])
-        if about != (VERSION, discipline, net_digest(net)):
+        about = (version := data["firable_evidence"], data["discipline"], data["digest"])
+        if not isinstance(version, int) or about != (VERSION, discipline, net_digest(net)):  # 2.0 equals 2
             return frozenset()
         return frozenset(one["name"] for one in data["verdicts"] if (one["status"], one["lacking"]) == ("proved", ""))
     except (ValueError, KeyError, TypeError, RecursionError):  # no JSON, or that of something else

@@ -18,7 +18,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final
 
 from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
 from cryptography.hazmat.primitives import serialization
@@ -43,7 +43,7 @@ class SignaturesRecord(BaseModel):
     """The file of signatures: the bundle that they are of, and for each public key its signature."""
 
     model_config = ConfigDict(defer_build=True, extra="forbid", strict=True)
-    firable_signatures: Literal[1] = 1
+    firable_signatures: Annotated[int, Field(ge=1, le=1)]  # no Literal: True and 1.0 equal 1
     bundle: _Hex32
     signatures: dict[_Hex32, _Hex64]
 
@@ -94,7 +94,7 @@ def sign(bundle: Bundle, bundle_path: str | Path, key_path: str | Path) -> str:
     """
     key = _secret(key_path)
     at = signatures_path(bundle_path)
-    record = SignaturesRecord(bundle=bundle.digest, signatures={})
+    record = SignaturesRecord(firable_signatures=1, bundle=bundle.digest, signatures={})
     if stands(at):
         found = _record(at)
         if found.bundle == bundle.digest:  # those of the bundle that stood here before are worth nothing now

@@ -23,7 +23,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, Final, NoReturn, TextIO
+from typing import Any, Final, NoReturn, TextIO, TypeGuard
 
 from firable.nets.diagnostics import Diagnostic, InputError, Span
 from firable.nets.net import Net
@@ -257,10 +257,10 @@ class _Reader:
                 "signals": bool(signals),
                 "commands": bool(commands),
             }:
-                if version != VERSION:
+                if version != VERSION or not _is_whole(version):
                     raise self.failure(1, line, f"version {version} of the trace format is not known")
                 machines, began = data.get("machines", []), data.get("began", 0.0)
-                if _are_names(machines) and isinstance(began, int | float) and 0 <= began <= SECONDS_MAX:
+                if _are_names(machines) and _is_number(began) and 0 <= began <= SECONDS_MAX:
                     kind, start = Discipline(discipline), self._start(line, data.get("start"))
                     return Header(net, digest, kind, signals, commands, tuple(machines), float(began), start)
         raise self.failure(1, line, "not the header of a trace")
@@ -277,24 +277,38 @@ class _Reader:
 
     def event(self, number: int, line: str) -> Event | End:
         data = self.record(number, line)
-        if isinstance(at := data.get("at"), float | int) and not abs(at) <= SECONDS_MAX:
-            raise self.failure(number, line, "no run lasts so long")
-        match data:
-            case {"at": float() | int() as at, "fired": list(names)} if (
-                names and all(isinstance(n, str) for n in names) and isinstance(data.get("round"), int | None)
-            ):
-                return Fired(float(at), tuple(names), data.get("round"))
-            case {"at": float() | int() as at, "signal": str(signal), "value": 0 | 1 as value}:
-                return SignalChanged(float(at), signal, bool(value))
-            case {"at": float() | int() as at, "command": str(place)}:
-                return CommandSent(float(at), place)
-            case {"at": float() | int() as at, "end": str(reason), "marking": list(names)} if all(
-                isinstance(n, str) for n in names
-            ):
-                return End(float(at), tuple(names), reason)
-            case {"at": float() | int() as at, "note": str(note)}:
-                return Noted(float(at), note, {k: v for k, v in data.items() if k not in {"at", "note"}})
+        if _is_number(at := data.get("at")):
+            if not abs(at) <= SECONDS_MAX:
+                raise self.failure(number, line, "no run lasts so long")
+            if event := _event(float(at), data):
+                return event
         raise self.failure(number, line, "not an event of a trace")
+
+
+def _event(at: float, data: dict[str, Any]) -> Event | End | None:
+    """What the data of a line say, if they are those of an event."""
+    round_ = data.get("round")
+    match data:
+        case {"fired": [*names]} if names and _are_names(names) and (round_ is None or _is_whole(round_)):
+            return Fired(at, tuple(names), round_)
+        case {"signal": str(signal), "value": 0 | 1 as value} if _is_whole(value):
+            return SignalChanged(at, signal, bool(value))
+        case {"command": str(place)}:
+            return CommandSent(at, place)
+        case {"end": str(reason), "marking": names} if _are_names(names):
+            return End(at, tuple(names), reason)
+        case {"note": str(note)}:
+            return Noted(at, note, {k: v for k, v in data.items() if k not in {"at", "note"}})
+    return None
+
+
+def _is_whole(data: object) -> bool:
+    # True, 1 and 1.0 are equal, and True is an int.
+    return isinstance(data, int) and not isinstance(data, bool)
+
+
+def _is_number(data: object) -> TypeGuard[int | float]:
+    return isinstance(data, float) or _is_whole(data)
 
 
 def _are_names(data: object) -> bool:

@@ -32,7 +32,7 @@ class _VerdictRecord(Data):
 class EvidenceRecord(Data):
     """The whole document."""
 
-    firable_evidence: Literal[2]
+    firable_evidence: Annotated[int, Field(ge=2, le=2)]  # no Literal: 2.0 equals 2
     seal: str
     digest: str
     discipline: Literal["interleaving", "step"]

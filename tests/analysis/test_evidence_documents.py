@@ -146,7 +146,9 @@ CHANGES: dict[str, tuple[str, Change, str]] = {
     ),
     "a theorem": ("free choice", of_certificate(name="free-will"), "Input should be 'marked-graph'"),
     "a discipline": ("weak", lambda data: data.update(discipline="eager"), "Input should be 'interleaving' or 'step'"),
-    "a version": ("weak", lambda data: data.update(firable_evidence=3), "firable_evidence: Input should be 2"),
+    "an earlier version": ("weak", lambda data: data.update(firable_evidence=1), "greater than or equal to 2"),
+    "a later version": ("weak", lambda data: data.update(firable_evidence=3), "less than or equal to 2"),
+    "a version with a point": ("weak", lambda data: data.update(firable_evidence=2.0), "should be a valid integer"),
     "a status": (
         "weak",
         lambda data: data["verdicts"][0].update(status="unknown"),

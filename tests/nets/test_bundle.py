@@ -387,6 +387,7 @@ def test_proof_without_its_evidence_is_none() -> None:
         document_naming(NET, ON_THE_NET, lacking="the time was over"),
         document_naming(NET, ON_THE_NET, discipline="step"),
         document_naming(NET, ON_THE_NET, version=1),
+        document_naming(NET, ON_THE_NET, version=2.0),
         document_naming(replace(NET, places=(replace(P, marked=False), Q, R)), ON_THE_NET),
         *("", "[]", "(check-sat)", '{"verdicts": 7}'),
     ],

@@ -107,6 +107,16 @@ def test_signatures_of_a_bundle_that_stood_there_before_are_dropped(bundle: Path
     assert "none of the keys" in refused(bundle, "theirs.pub")
 
 
+@pytest.mark.parametrize("version", ['"firable_signatures": true,', '"firable_signatures": 1.0,', ""])
+def test_a_file_of_signatures_in_no_version_is_refused(bundle: Path, version: str) -> None:
+    sign(read_bundle(bundle), bundle, bundle.with_name("ours"))
+    at = signatures_path(bundle)
+    written = at.read_text()
+    assert written.count('"firable_signatures":1,') == 1
+    at.write_text(written.replace('"firable_signatures":1,', version))
+    assert "F5024" in refused(bundle, "ours.pub")
+
+
 @pytest.mark.parametrize("text", ["", "{}", "[]", '{"firable_signatures":1,"bundle":"x","signatures":{}}', "\0" * 10])
 def test_a_damaged_file_of_signatures_is_refused(bundle: Path, text: str) -> None:
     signatures_path(bundle).write_text(text)

@@ -183,6 +183,10 @@ def test_a_trace_that_was_cut_off_replays_as_incomplete() -> None:
         '{"at": 1}',
         '{"at": 0, "fired": []}',
         '{"at": 0, "signal": "done", "value": 2}',
+        '{"at": 0, "signal": "done", "value": true}',
+        '{"at": 0, "signal": "done", "value": 1.0}',
+        '{"at": 0, "fired": ["go"], "round": true}',
+        '{"at": true, "fired": ["go"]}',
         "[" * 100_000,
         '{"at": NaN, "note": "x"}',
         '{"at": 1e400, "note": "x"}',
@@ -196,9 +200,9 @@ def test_a_malformed_line_is_named(line: str) -> None:
         parse_trace(f"{header}\n{line}\n")
 
 
-@pytest.mark.parametrize("began", [-1, 1e12, 10**400])
-def test_a_run_that_began_at_no_date_is_none(began: float) -> None:
-    header = {**json.loads(text_of(trace()).splitlines()[0]), "began": began}
+@pytest.mark.parametrize("wrong", [{"began": one} for one in (-1, 1e12, 10**400, True)] + [{"firable_trace": True}])
+def test_a_run_that_began_at_no_date_or_in_no_version_is_none(wrong: dict[str, object]) -> None:
+    header = {**json.loads(text_of(trace()).splitlines()[0]), **wrong}
     with pytest.raises(InputError, match=r"<trace>:1:1: error\[F5005\]"):
         parse_trace(json.dumps(header) + "\n")
 

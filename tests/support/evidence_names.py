@@ -14,7 +14,7 @@ def document_naming(
     status: str = "proved",
     lacking: str = "",
     discipline: str = "interleaving",
-    version: int = 2,
+    version: float = 2,
 ) -> str:
     """A text with a record of each name, all of this status."""
     records = [{"name": name, "status": status, "query": "", "lacking": lacking, "shown": []} for name in names]
