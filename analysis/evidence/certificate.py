@@ -32,6 +32,7 @@ and Stålmarck 2000, "Checking safety properties using induction and a SAT-solve
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -273,3 +274,12 @@ class Unfolded:
 
 
 Certificate = FiringSequence | NeverCertificate | Continuation | Progress | Theorem | Unfolded
+
+
+def sets_of(certificate: Certificate | None) -> Iterator[Markings | Diagram]:
+    """The sets of markings that a certificate rests on."""
+    match certificate:
+        case Labelling(space) | StubbornSets(space) | Progress(space) | Unfolded(space):
+            yield space
+        case Reduction(then=then) | Continuation(then=then) | Theorem(contact=then):
+            yield from sets_of(then)

@@ -38,7 +38,7 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
-from firable.analysis.evidence.certificate import Certificate
+from firable.analysis.evidence.certificate import Certificate, sets_of
 from firable.analysis.evidence.certificate_records import certificate_to_json
 from firable.analysis.evidence.claim_records import Sets, claim_to_json
 from firable.analysis.evidence.claims import NEVER_FALSE, Claim
@@ -266,4 +266,7 @@ def _document(record: EvidenceRecord) -> Document:
         if any(one >= after for one, after in pairwise(order_of(claim) for claim, _ in shown)):
             raise ValueError(f"the claims of '{verdict.name}' are not in order, each once")
         records.append(Record(verdict.name, verdict.status == "proved", tuple(shown), verdict.lacking, verdict.query))
+    named = {id(space) for record in records for _, certificate in record.shown for space in sets_of(certificate)}
+    if spare := [number for number, space in enumerate(sets) if id(space) not in named]:
+        raise ValueError(f"nothing rests on set {spare[0]}")
     return Document(net, Discipline(record.discipline), tuple(records))

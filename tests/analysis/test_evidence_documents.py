@@ -94,6 +94,16 @@ CHANGES: dict[str, tuple[str, Change, str]] = {
     "a goal of a home marking": ("marked graph", of_claim(kind="home", goal="a"), "'home' has no goal"),
     "a goal of steps in order": ("ordered", of_claim(goal="a"), "'ordered' has no goal"),
     "a goal of steps without order": ("unordered", of_claim(goal="false"), "'unordered' has no goal"),
+    "a set beside those that something rests on": (
+        "markings",
+        lambda data: data["sets"].append({"kind": "markings", "markings": []}),
+        "nothing rests on set 1",
+    ),
+    "a diagram where nothing rests on sets": (
+        "invariant",
+        lambda data: data["sets"].append(DIAGRAM | {"order": []}),
+        "nothing rests on set 0",
+    ),
     "a set": ("markings", of_certificate(set=1), "no set 1"),
     "a set of stubborn sets": ("stubborn sets", of_certificate(set=1), "no set 1"),
     "a listed set of ranks": ("weak", lambda data: data["sets"].__setitem__(0, DIAGRAM), "set 0 is not listed"),
