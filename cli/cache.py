@@ -54,17 +54,16 @@ class Cache:
         """What is kept under a key; None where there is nothing, or nothing whole."""
         from pydantic import ValidationError
 
-        from firable.nets.bundle_records import VerdictRecord
+        from firable.cli.kept_records import KeptRecord
 
         try:
             checksum, _, text = (self.folder / key).read_text(encoding="utf-8").partition("\n")
             if checksum != _sha256(text):
                 return None
-            data = json.loads(text)
-            # As JSON, where an enumeration is a string and a tuple an array.
-            records = [VerdictRecord.model_validate_json(json.dumps(verdict)) for verdict in data["verdicts"]]
-            return Kept(tuple(record.verdict() for record in records), data["figures"], tuple(data["course"]))
-        except (OSError, ValueError, KeyError, TypeError, RecursionError, ValidationError):
+            kept = KeptRecord.model_validate_json(text)
+            verdicts = tuple(record.verdict() for record in kept.verdicts)
+            return Kept(verdicts, json.loads(text)["figures"], tuple(kept.course))
+        except (OSError, ValueError, RecursionError, ValidationError):
             return None
 
     def write(self, key: str, found: Kept) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import json
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
@@ -150,6 +151,49 @@ def test_an_entry_that_somebody_else_has_written_is_no_answer(
     entry.write_text(f"{sha256(text.encode()).hexdigest()}\n{text}", encoding="utf-8")
     assert checked(folder, NET, capsys) == first
     assert len(explored) == 2
+
+
+FIGURES: list[dict[str, object]] = [
+    {"markings": None},
+    {"markings": -1},
+    {"edges": "3"},
+    {"complete": 1},
+    {"dead": [1]},
+    {"gate_races": [["t"]]},
+    {"contacts": []},
+    {"effective_conflicts": {"by_input": []}},
+    {"structure": {}},
+    {"structure": None},
+    {"note": ""},
+]
+
+
+@pytest.mark.parametrize("changed", [*FIGURES, "course"], ids=str)
+def test_an_entry_of_another_shape_is_no_answer(
+    changed: dict[str, object] | str, folder: Path, explored: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    first = checked(folder, NET, capsys)
+    (entry,) = (folder / "cache").iterdir()
+    data = json.loads(entry.read_text(encoding="utf-8").partition("\n")[2])
+    if isinstance(changed, str):
+        data["course"] = "explored"
+    else:
+        data["figures"] |= changed
+    text = json.dumps(data)
+    entry.write_text(f"{sha256(text.encode()).hexdigest()}\n{text}", encoding="utf-8")
+    assert checked(folder, NET, capsys) == first
+    assert len(explored) == 2
+
+
+@pytest.mark.parametrize(
+    "options", [["--structure"], ["--discipline", "step", "--structure"], ["--method", "symbolic"]], ids=" ".join
+)
+def test_figures_of_each_kind_are_read_again(
+    options: list[str], folder: Path, explored: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    first = checked(folder, NET, capsys, *options)
+    assert checked(folder, NET, capsys, *options) == first
+    assert len(explored) == 1
 
 
 def test_what_is_unknown_is_asked_again(folder: Path, explored: list[str], capsys: pytest.CaptureFixture[str]) -> None:
