@@ -16,9 +16,9 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, FailFast, ValidationError
 
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.formula import Formula, FormulaError, format_formula, parse_formula
@@ -46,6 +46,11 @@ from firable.nets.verdict import Expectation, Status
 
 FORMAT: Final = "firable-net/3"
 _ANEW: Final = f"write it anew with `net_to_json`, or make the bundle or the evidence anew: the form is {FORMAT}"
+
+
+T = TypeVar("T")
+Many = Annotated[list[T], FailFast()]
+"""A list, read as far as its first wrong item: an error for each of very many takes some hundred times their memory."""
 
 
 def net_to_json(net: Net) -> dict[str, Any]:
@@ -261,7 +266,7 @@ class _ControllerRecord(_Record):
     under: str | None
 
 
-_Pairs = list[Annotated[tuple[str, str], BeforeValidator(lambda v: tuple(v) if isinstance(v, list) else v)]]
+_Pairs = Many[Annotated[tuple[str, str], BeforeValidator(lambda v: tuple(v) if isinstance(v, list) else v)]]
 
 
 class _CommandRecord(_Record):
@@ -312,18 +317,18 @@ class _GateRecord(_Record):
 
 class _TransitionRecord(_Record):
     name: str
-    inputs: list[str]
-    outputs: list[str]
-    permissive: list[str]
-    inhibitive: list[str]
-    external: list[_GateRecord]
+    inputs: Many[str]
+    outputs: Many[str]
+    permissive: Many[str]
+    inhibitive: Many[str]
+    external: Many[_GateRecord]
     number: int | None
     description: str
 
 
 class _ArbiterRecord(_Record):
     name: str
-    among: list[str]
+    among: Many[str]
     by: Literal["priority", "order", "rotation"]
 
 
@@ -339,10 +344,10 @@ class _NetRecord(_Record):
     format: Literal["firable-net/3"]
     name: str
     description: str
-    controllers: list[_ControllerRecord]
-    places: list[_PlaceRecord]
-    signals: list[_SignalRecord]
-    transitions: list[_TransitionRecord]
-    arbiters: list[_ArbiterRecord]
-    properties: list[_PropertyRecord]
+    controllers: Many[_ControllerRecord]
+    places: Many[_PlaceRecord]
+    signals: Many[_SignalRecord]
+    transitions: Many[_TransitionRecord]
+    arbiters: Many[_ArbiterRecord]
+    properties: Many[_PropertyRecord]
     expected: dict[str, Literal["proved", "violated"]] = {}

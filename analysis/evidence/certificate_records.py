@@ -39,6 +39,7 @@ from firable.analysis.evidence.certificate import (
 )
 from firable.analysis.evidence.claim_records import Data, Hexadecimal, Natural, Sets, known
 from firable.nets.formula import format_formula, parse_formula
+from firable.nets.interchange import Many
 from firable.nets.net import Net
 
 DEPTH_MAX: Final = 1_000
@@ -46,7 +47,7 @@ ROUNDS_MAX: Final = 1_000_000
 _DIGITS_MAX: Final = 4_000  # of one number: Python prints up to 4,300 digits, and sums of these are printed, too
 _NUMBER_MAX: Final = 10**_DIGITS_MAX
 
-Firings = list[list[str]]
+Firings = Many[Many[str]]
 
 
 class _FiringSequenceRecord(Data):
@@ -65,15 +66,15 @@ class _SumRecord(Data):
 
 
 class _ClauseRecord(Data):
-    marked: list[str]
-    empty: list[str]
+    marked: Many[str]
+    empty: Many[str]
 
 
 class _InvariantRecord(Data):
     kind: Literal["inductive-invariant"]
-    equations: list[_SumRecord]
-    inequalities: list[_SumRecord]
-    clauses: list[_ClauseRecord]
+    equations: Many[_SumRecord]
+    inequalities: Many[_SumRecord]
+    clauses: Many[_ClauseRecord]
     depth: Annotated[int, Field(ge=0, le=DEPTH_MAX)]
 
     def of(self, net: Net, _: Sequence[Markings | Diagram]) -> InductiveInvariant:
@@ -92,7 +93,7 @@ class _InvariantRecord(Data):
 
 class _RanksRecord(Data):
     kind: Literal["ranks"]
-    ranks: list[Annotated[int, Field(ge=-1)]]
+    ranks: Many[Annotated[int, Field(ge=-1)]]
 
     def of(self, _: Net) -> Ranks:
         return Ranks(tuple(self.ranks))
@@ -100,7 +101,7 @@ class _RanksRecord(Data):
 
 class _BackRecord(Data):
     kind: Literal["back"]
-    transitions: list[str]
+    transitions: Many[str]
 
     def of(self, net: Net) -> Back:
         return Back(tuple(known(name, net.transition_index) for name in self.transitions))
@@ -137,7 +138,7 @@ _LabelRecord = Annotated[
 class _LabellingRecord(Data):
     kind: Literal["labelling"]
     set: Natural
-    labels: list[_LabelRecord]
+    labels: Many[_LabelRecord]
 
     def of(self, net: Net, sets: Sequence[Markings | Diagram]) -> Labelling:
         return Labelling(_set(sets, self.set), tuple(label.of(net) for label in self.labels))
@@ -146,8 +147,8 @@ class _LabellingRecord(Data):
 class _StubbornRecord(Data):
     kind: Literal["stubborn-sets"]
     set: Natural
-    stubborn: list[Hexadecimal]
-    chosen: list[Natural]
+    stubborn: Many[Hexadecimal]
+    chosen: Many[Natural]
 
     def of(self, net: Net, sets: Sequence[Markings | Diagram]) -> StubbornSets:
         stubborn = tuple(int(one, 16) for one in self.stubborn)
@@ -158,8 +159,8 @@ class _StubbornRecord(Data):
 
 class _StepRecord(Data):
     rule: str
-    moves: list[Natural] = Field(default_factory=list)
-    places: list[str] = Field(default_factory=list)
+    moves: Many[Natural] = Field(default_factory=list)
+    places: Many[str] = Field(default_factory=list)
 
     def of(self, net: Net) -> Step:
         return Step(Rule(self.rule), tuple(self.moves), _places(net, self.places))
@@ -167,8 +168,8 @@ class _StepRecord(Data):
 
 class _ReductionRecord(Data):
     kind: Literal["reduction"]
-    steps: list[_StepRecord]
-    part: list[str]
+    steps: Many[_StepRecord]
+    part: Many[str]
     goal: str
     then: Annotated[_InvariantRecord | _LabellingRecord | _StubbornRecord, Field(discriminator="kind")] | None
 
@@ -195,8 +196,8 @@ class _ContinuationRecord(Data):
 class _ProgressRecord(Data):
     kind: Literal["progress"]
     set: Natural
-    ranks: list[list[Natural]]
-    helpful: list[Annotated[tuple[list[Natural], str], Field(strict=False)]]  # not strict: a pair is an array here
+    ranks: Many[Many[Natural]]
+    helpful: Many[Annotated[tuple[Many[Natural], str], Field(strict=False)]]  # not strict: a pair is an array here
 
     def of(self, net: Net, sets: Sequence[Markings | Diagram]) -> Progress:
         helpful = tuple((tuple(prefix), known(name, net.transition_index)) for prefix, name in self.helpful)
@@ -209,7 +210,7 @@ class _TheoremRecord(Data):
     kind: Literal["theorem"]
     name: Literal["marked-graph", "free-choice", "asymmetric-choice"]
     contact: _NeverRecord
-    traps: list[list[str]]
+    traps: Many[Many[str]]
 
     def of(self, net: Net, sets: Sequence[Markings | Diagram]) -> Theorem:
         traps = tuple(_places(net, trap) for trap in self.traps)

@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from firable.analysis.evidence.certificate import Diagram, Markings
 from firable.analysis.evidence.claims import STATE_GOALS, TRUE, Claim, ClaimKind
 from firable.nets.formula import Formula, Holds, format_formula, parse_formula
+from firable.nets.interchange import Many
 from firable.nets.net import Fairness, Marking, Net
 from firable.nets.temporal import Logic, Temporal, format_temporal, logics, parse_temporal
 from firable.nets.temporal_parts import atoms_in
@@ -45,7 +46,7 @@ class ClaimRecord(Data):
     goal: str
     then: str = ""
     fairness: Annotated[Fairness, Field(strict=False)] = Fairness.NONE
-    fires: list[str] = []
+    fires: Many[str] = []
 
     def of(self, net: Net) -> Claim:
         """The claim, its names looked up; refused where it says what nobody would look at."""
@@ -92,7 +93,7 @@ class MarkingsRecord(Data):
     """Listed markings."""
 
     kind: Literal["markings"]
-    markings: list[Hexadecimal]
+    markings: Many[Hexadecimal]
 
     def space(self, net: Net) -> Markings:
         """The set."""
@@ -108,7 +109,7 @@ class AscendingRecord(Data):
     """Many listed markings: the smallest, and by how much each other one is larger than the one before it."""
 
     kind: Literal["ascending"]
-    markings: list[Hexadecimal]
+    markings: Many[Hexadecimal]
 
     def space(self, net: Net) -> Markings:
         """The set."""
@@ -125,9 +126,9 @@ class DiagramRecord(Data):
     """A decision diagram."""
 
     kind: Literal["diagram"]
-    order: list[str]
-    rows: list[Annotated[list[Natural], Field(min_length=3, max_length=3)]]
-    roots: Annotated[list[Natural], Field(min_length=1)]
+    order: Many[str]
+    rows: Many[Annotated[Many[Natural], Field(min_length=3, max_length=3)]]
+    roots: Annotated[Many[Natural], Field(min_length=1)]
 
     def space(self, net: Net) -> Diagram:
         """The set."""

@@ -18,7 +18,8 @@ the document and seals it anew has either made another proof, or none.
                       the same one; `lacking`: why nothing shows it, where that is so
 
 A verdict that nothing shows stands there too, and why: what is only claimed is to be seen. A document larger than a
-mebibyte is compressed (gzip); it is read like any other. Rejected: a file for each verdict, which repeats net and
+mebibyte is compressed (gzip); it is read like any other, but only as far as a hundred times its file, so that who reads
+a small file needs little memory. Rejected: a file for each verdict, which repeats net and
 markings a hundred times; to name the net by its digest only, which makes evidence worthless where the file of the net
 is lost; and to keep the obligations instead of the data they come from, which would let a forger choose what is to be
 proved.
@@ -57,6 +58,8 @@ SIZE_BYTES_MAX: Final = 2**28
 """The largest document that is read, compressed or not."""
 PLAIN_BYTES_MAX: Final = 2**20
 """The largest document that is written without compressing it."""
+PACKED_MAX: Final = 100
+"""How many times as large as its file a document may be; one that would be more is written without compressing it."""
 _GZIP: Final = b"\x1f\x8b"
 
 
@@ -117,7 +120,8 @@ class Document:
     def to_bytes(self) -> bytes:
         """The document as a file holds it: compressed where it is large, and always the same."""
         data = self.to_text().encode()
-        return data if len(data) <= PLAIN_BYTES_MAX else gzip.compress(data, mtime=0)
+        packed = gzip.compress(data, mtime=0) if len(data) > PLAIN_BYTES_MAX else data
+        return packed if len(data) <= PACKED_MAX * len(packed) else data
 
 
 class _Before:
@@ -173,13 +177,7 @@ def read_document(path: str | Path) -> Document:
     """
     file, data = str(path), read_bytes(path, SIZE_BYTES_MAX)
     if data.startswith(_GZIP):
-        unpacker = zlib.decompressobj(wbits=31)
-        try:
-            data = unpacker.decompress(data, SIZE_BYTES_MAX)
-        except zlib.error as error:
-            raise _damaged(file, f"it cannot be unpacked: {error}") from None
-        if not unpacker.eof or unpacker.unused_data:
-            raise _damaged(file, "it unpacks to too much, or not to its end")
+        data = _unpacked(file, data)
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError:
@@ -187,6 +185,20 @@ def read_document(path: str | Path) -> Document:
     if not text.lstrip().startswith("{"):
         raise _neither(file)
     return document_from_text(text, file)
+
+
+def _unpacked(file: str, packed: bytes) -> bytes:
+    """What a compressed document holds; to read it takes memory in proportion to its file, as of one that is not."""
+    unpacker, most = zlib.decompressobj(wbits=31), min(SIZE_BYTES_MAX, PACKED_MAX * len(packed))
+    try:
+        data = unpacker.decompress(packed, most + 1)
+    except zlib.error as error:
+        raise _damaged(file, f"it cannot be unpacked: {error}") from None
+    if len(data) > most:
+        raise _damaged(file, f"it unpacks to more than {most:,} bytes")
+    if not unpacker.eof or unpacker.unused_data:
+        raise _damaged(file, "it unpacks not to its end, or to more than one document")
+    return data
 
 
 def document_from_text(text: str, file: str = "") -> Document:

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from firable.analysis.evidence.certificate_records import CertificateRecord
 from firable.analysis.evidence.claim_records import AscendingRecord, ClaimRecord, Data, DiagramRecord, MarkingsRecord
+from firable.nets.interchange import Many
 
 
 class BeforeRecord(Data):
@@ -26,7 +27,7 @@ class _VerdictRecord(Data):
     status: Literal["proved", "violated"]
     query: str
     lacking: str
-    shown: list[_ShownRecord]
+    shown: Many[_ShownRecord]
 
 
 class EvidenceRecord(Data):
@@ -36,6 +37,6 @@ class EvidenceRecord(Data):
     seal: str
     digest: str
     discipline: Literal["interleaving", "step"]
-    verdicts: list[_VerdictRecord]
-    sets: list[Annotated[MarkingsRecord | AscendingRecord | DiagramRecord, Field(discriminator="kind")]]
+    verdicts: Many[_VerdictRecord]
+    sets: Many[Annotated[MarkingsRecord | AscendingRecord | DiagramRecord, Field(discriminator="kind")]]
     net: dict[str, Any]

@@ -2,7 +2,9 @@
 
 import gzip
 import json
+import tracemalloc
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +12,10 @@ import pytest
 from support.evidence import document
 from support.evidence_examples import EXAMPLES
 
-from firable.analysis.evidence.document import document_from_text, read_document, seal
+from firable.analysis.evidence.document import Document, document_from_text, read_document, seal
 from firable.nets.diagnostics import InputError
+from firable.nets.net import Net, Place
+from firable.semantics.trace import Discipline
 
 Change = Callable[[dict[str, Any]], object]
 
@@ -235,12 +239,56 @@ def test_what_is_compressed_is_one_document_whole(
         read_document(file)
 
 
-def test_a_document_that_unpacks_to_too_much_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def text() -> bytes:
     found = EXAMPLES["invariant"]()
     assert found is not None
-    file, text = tmp_path / "packed.json.gz", document(found).to_text().encode()
-    file.write_bytes(gzip.compress(text + b" " * 10_000))
-    assert read_document(file).records == document(found).records
+    return document(found).to_text().encode()
+
+
+def test_a_document_that_unpacks_to_more_than_is_read_is_refused(
+    text: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "packed.json.gz"
+    file.write_bytes(gzip.compress(text))
     monkeypatch.setattr("firable.analysis.evidence.document.SIZE_BYTES_MAX", len(text))
-    with pytest.raises(InputError, match="it unpacks to too much"):
+    assert read_document(file).records == document_from_text(text.decode()).records
+    monkeypatch.setattr("firable.analysis.evidence.document.SIZE_BYTES_MAX", len(text) - 1)
+    with pytest.raises(InputError, match=f"F6001.*it unpacks to more than {len(text) - 1:,} bytes"):
         read_document(file)
+
+
+def test_a_document_that_is_much_larger_than_its_file_is_refused(text: bytes, tmp_path: Path) -> None:
+    file = tmp_path / "packed.json.gz"
+    file.write_bytes(gzip.compress(text + b" " * 10 * len(text)))
+    assert read_document(file).records == document_from_text(text.decode()).records
+    packed = gzip.compress(text + b" " * 2**26)
+    file.write_bytes(packed)
+    with pytest.raises(InputError, match=f"F6001.*it unpacks to more than {100 * len(packed):,} bytes"):
+        read_document(file)
+
+
+def test_a_document_that_would_be_much_larger_than_its_file_is_not_compressed(tmp_path: Path) -> None:
+    file, net = tmp_path / "evidence", Net("n", (Place("p"),), description="x" * 2**20)
+    for description, is_packed in (("x" * 2**21, False), ("".join(map(str, range(2**18))), True)):
+        whole = Document(replace(net, description=description), Discipline.INTERLEAVING, ())
+        file.write_bytes(whole.to_bytes())
+        assert read_document(file) == whole
+        assert file.read_bytes().startswith(b"\x1f\x8b") == is_packed
+
+
+@pytest.mark.parametrize("where", ["sets", "net"])
+def test_of_very_many_things_that_are_none_the_first_is_told(where: str, text: bytes) -> None:
+    data = json.loads(text)
+    if where == "sets":
+        data["sets"].append({"kind": "markings", "markings": [0] * 100_000})
+    else:
+        data["net"]["places"] = [0] * 100_000
+    whole = sealed(data)
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError, match=r"F6001.*0: Input should be"):
+            document_from_text(whole)
+        assert tracemalloc.get_traced_memory()[1] < 2**24
+    finally:
+        tracemalloc.stop()
