@@ -11,7 +11,7 @@ in docs/codes with an example that is run (or a row in tests/support/exact_words
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
@@ -323,23 +323,3 @@ def with_meant(message: str, name: str, known: Sequence[str]) -> str:
     """
     near = did_you_mean(name, known).rstrip()
     return f"{message.removesuffix('.')}; {near}" if near else message
-
-
-def unknown_name(
-    code: str,
-    kind: str,
-    name: str,
-    known: Collection[str],
-    subject: Subject,
-    hint: str = "declare it first, or correct the name",
-) -> Diagnostic:
-    """The diagnostic on a name that nothing has, with the known name that was probably meant."""
-    owner, _, own = name.partition(".")
-    if f"{owner}.{name}" in known:  # declared by its full name, where the local one is expected
-        said = f"'{owner}.{name}' is declared: inside '{owner}' names are local, so write '{own}' there"
-        return Diagnostic(code, f"there is no {kind} '{name}'", said, subject)
-    local = min((full for full in known if full.rpartition(".")[2] == name), default=None)
-    # Names much longer or shorter are no slips of the pen, and would be sorted for nothing.
-    similar = sorted(full for full in known if abs(len(full) - len(name)) <= 4)
-    suggestion = f"did you mean '{local}'? " if local else did_you_mean(name, similar)
-    return Diagnostic(code, f"there is no {kind} '{name}'", f"{suggestion}{hint}", subject)

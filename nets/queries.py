@@ -231,7 +231,7 @@ class KnownNames:
             if (before := name.removesuffix(";")) != name:
                 write = f"write `{before}`" if before in known | words else "leave it out"
                 problem = replace(problem, hint=f"{_NO_SEMICOLON}: {write}")
-            yield replace(problem, message=problem.message.replace(f"'{name}'", quoted(name)))
+            yield problem
 
 
 def query_named(text: str, net: Net, name: str = "query") -> Query:

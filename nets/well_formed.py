@@ -7,11 +7,11 @@ express, such as a completion signal that gates nothing, is a `ValueError`: the 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Set
+from collections.abc import Collection, Iterator, Mapping, Set
 from dataclasses import dataclass, replace
 from typing import Final
 
-from firable.nets.diagnostics import Diagnostic, Subject, did_you_mean, unknown_name
+from firable.nets.diagnostics import Diagnostic, Subject, did_you_mean
 from firable.nets.formula import CONSTANT_ATOMS, Firable, Holds, names_in
 from firable.nets.net import (
     ArbitrationRule,
@@ -26,6 +26,7 @@ from firable.nets.net import (
     Transition,
     is_fault,
 )
+from firable.nets.source import quoted
 from firable.nets.temporal import Fires, logics
 from firable.nets.temporal_parts import atoms_in
 from firable.nets.time_limits import limit_problems
@@ -116,7 +117,7 @@ def _ownership(net: Net, controllers: set[str]) -> Iterator[Diagnostic]:
             if item.owner not in controllers:
                 yield Diagnostic(
                     "F2005",
-                    f"'{item.name}' is owned by '{item.owner}', which is no controller",
+                    f"'{item.name}' is owned by {quoted(item.owner)}, which is no controller",
                     did_you_mean(item.owner, sorted(controllers)) + "declare it under `controllers`",
                     subject,
                 )
@@ -139,7 +140,7 @@ def _layers(net: Net, controllers: set[str]) -> Iterator[Diagnostic]:
         if controller.under not in controllers:
             yield Diagnostic(
                 "F2005",
-                f"'{controller.name}' is under '{controller.under}', which is no controller",
+                f"'{controller.name}' is under {quoted(controller.under)}, which is no controller",
                 did_you_mean(controller.under, sorted(controllers)) + "declare it under `controllers`",
                 subject,
             )
@@ -182,7 +183,7 @@ def _completions(net: Net) -> Iterator[Diagnostic]:
         subject: Subject = ("places", place.name, "until")
         signal = signals.get(place.completion)
         if signal is None:
-            yield unknown_name("F2003", "signal", place.completion, signals, subject)
+            yield _unknown_name("F2003", "signal", place.completion, signals, subject)
         elif signal.kind is not SignalKind.COMPLETION:
             declared = "a sensor" if signal.kind is SignalKind.SENSOR else "a timer"
             yield Diagnostic(
@@ -309,20 +310,20 @@ def _transition_problems(transition: Transition, known: _Known) -> Iterator[Diag
             elif not is_gate:
                 own = name.rpartition(".")[2]
                 alike = [signal for signal in signals if signal.rpartition(".")[2] == own]
-                unknown = unknown_name("F2002", "place", name, places, subject)
+                unknown = _unknown_name("F2002", "place", name, places, subject)
                 if len(alike) == 1:
                     hint = f"'{alike[0]}' is a signal, which can be a gate: write it under `if` or `unless`"
                     unknown = replace(unknown, hint=hint)
                 yield unknown
             elif name not in signals:
-                yield unknown_name("F2021", "place or signal", name, places | signals, subject)
+                yield _unknown_name("F2021", "place or signal", name, places | signals, subject)
             else:
                 raise ValueError(f"the internal gate '{name}' of '{transition.name}' is a signal: its gate is external")
     seen_gates: set[ExternalGate] = set()
     for gate in transition.external:
         subject = ("transitions", transition.name, "if" if gate.wanted else "unless", gate.signal)
         if gate.signal not in signals:
-            yield unknown_name("F2003", "signal", gate.signal, signals, subject)
+            yield _unknown_name("F2003", "signal", gate.signal, signals, subject)
         if gate in seen_gates:
             yield Diagnostic(
                 "F2022", f"the gate '{gate.signal}' of '{transition.name}' stands twice", "write it once", subject
@@ -363,7 +364,7 @@ def _arbiters(net: Net) -> Iterator[Diagnostic]:
             )
         for name in dict.fromkeys(arbiter.among):
             if name not in names:
-                yield unknown_name("F2004", "transition", name, names, (*subject, name))
+                yield _unknown_name("F2004", "transition", name, names, (*subject, name))
             elif (other := taken.setdefault(name, arbiter.name)) != arbiter.name:
                 yield Diagnostic(
                     "F2013",
@@ -410,16 +411,37 @@ def unknown_in_formula(
         transitions = {transition.name for transition in net.transitions}
         if name in transitions:
             said = f"write `firable({name})` where it may fire, or name a place"
-            return Diagnostic("F2002", f"'{name}' is a transition, and no place", said, subject)
+            return Diagnostic("F2002", f"{quoted(name)} is a transition, and no place", said, subject)
         known = {place.name for place in net.places} | (words - {name})
-        return unknown_name("F2002", kind, name, known, subject, hint)
+        return _unknown_name("F2002", kind, name, known, subject, hint)
     if any(place.name == name for place in net.places):
         filling = next(
             (f", such as '{one.name}', which puts a token on it" for one in net.transitions if name in one.outputs), ""
         )
         said = f"write `{name}` for a token on it, or name a transition{filling}"
-        return Diagnostic("F2004", f"'{name}' is a place, and no transition", said, subject)
-    return unknown_name("F2004", kind, name, {transition.name for transition in net.transitions}, subject, hint)
+        return Diagnostic("F2004", f"{quoted(name)} is a place, and no transition", said, subject)
+    return _unknown_name("F2004", kind, name, {transition.name for transition in net.transitions}, subject, hint)
+
+
+def _unknown_name(
+    code: str,
+    kind: str,
+    name: str,
+    known: Collection[str],
+    subject: Subject,
+    hint: str = "declare it first, or correct the name",
+) -> Diagnostic:
+    """The diagnostic on a name that nothing has, with the known name that was probably meant."""
+    message, (owner, _, own) = f"there is no {kind} {quoted(name)}", name.partition(".")
+    if f"{owner}.{name}" in known:  # declared by its full name, where the local one is expected
+        full = quoted(f"{owner}.{name}")
+        said = f"{full} is declared: inside {quoted(owner)} names are local, so write {quoted(own)} there"
+        return Diagnostic(code, message, said, subject)
+    local = min((full for full in known if full.rpartition(".")[2] == name), default=None)
+    # Names much longer or shorter are no slips of the pen, and would be sorted for nothing.
+    similar = sorted(full for full in known if abs(len(full) - len(name)) <= 4)
+    suggestion = f"did you mean {quoted(local)}? " if local else did_you_mean(name, similar)
+    return Diagnostic(code, message, f"{suggestion}{hint}", subject)
 
 
 def _atoms(prop: Property | TemporalProperty) -> Iterator[Holds | Firable | Fires]:

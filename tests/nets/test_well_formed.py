@@ -5,7 +5,20 @@ from collections.abc import Callable
 import pytest
 
 from firable.nets.diagnostics import InputError
-from firable.nets.net import Command, Controller, ExternalGate, Net, Place, Signal, SignalKind, Transition
+from firable.nets.formula import Firable, Holds
+from firable.nets.net import (
+    Arbiter,
+    Command,
+    Controller,
+    ExternalGate,
+    Net,
+    Place,
+    Property,
+    PropertyKind,
+    Signal,
+    SignalKind,
+    Transition,
+)
 from firable.nets.well_formed import problems
 
 A = Controller("a")
@@ -51,6 +64,35 @@ def test_the_broken_rule_is_named_with_its_subject(
     (problem,) = refusal.value.diagnostics
     assert (problem.code, problem.subject) == (code, subject)
     assert hint in problem.hint
+
+
+LONG = "long" * 100_000
+UNKNOWN: dict[str, Callable[[], Net]] = {
+    "place": lambda: Net("n", transitions=(Transition("t", (LONG,)),)),
+    "completion": lambda: Net("n", (Place("p", command=SEND, completion=LONG),)),
+    "internal gate": lambda: Net("n", transitions=(Transition("t", permissive=(LONG,)),)),
+    "external gate": lambda: Net("n", transitions=(Transition("t", external=(ExternalGate(LONG),)),)),
+    "transition": lambda: Net("n", arbiters=(Arbiter("a", (LONG, LONG + "er")),)),
+    "place of a formula": lambda: Net("n", properties=(Property("p", PropertyKind.NEVER, Holds(LONG)),)),
+    "transition of a formula": lambda: Net("n", properties=(Property("p", PropertyKind.NEVER, Firable(LONG)),)),
+    "transition for a place": lambda: Net(
+        "n", transitions=(Transition(LONG),), properties=(Property("p", PropertyKind.NEVER, Holds(LONG)),)
+    ),
+    "place for a transition": lambda: Net(
+        "n", (Place(LONG),), properties=(Property("p", PropertyKind.NEVER, Firable(LONG)),)
+    ),
+    "owner": lambda: Net("n", (Place("p", LONG),), controllers=(A,)),
+    "controller above": lambda: Net("n", controllers=(Controller("b", under=LONG),)),
+}
+
+
+@pytest.mark.parametrize("kind", UNKNOWN)
+def test_a_name_that_nothing_has_is_told_shortened(kind: str) -> None:
+    with pytest.raises(InputError) as refusal:
+        UNKNOWN[kind]()
+    problem = refusal.value.diagnostics[0]
+    assert len(problem.message) < 200
+    assert "'longlong" in problem.message
 
 
 def test_a_completion_that_gates_nothing_is_the_fault_of_a_program() -> None:
