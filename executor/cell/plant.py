@@ -253,8 +253,10 @@ class Plant:
         return list(self._seen())
 
     def halt(self) -> None:
-        """Stop every machine where it is: the safe output of the simulated cell."""
-        self.faulted = True
+        """Stop every machine where it is: the safe output of the simulated cell.
+
+        Nobody outside stands still by that: workpieces come and go, a door is opened, somebody presses a key.
+        """
         for machine in self.machines:
             self.stand(machine)
 
@@ -284,6 +286,7 @@ class Plant:
         try:
             reports.extend(happening)
         except _FaultError as fault:
+            self.faulted = True
             self.halt()
             reports.append(PlantFault(machine, str(fault)))
         # What is seen comes before what is acknowledged: a completion is formed from both.

@@ -64,7 +64,6 @@ class SimulatedDriver:
         self.interrupted: set[tuple[str, int]] = set()
         """The commands that a stop has ended."""
         self.stopped = False
-        self.failed = False
         self.next_ticket = 0
         self.clock: Clock | None = None
         self.listener: Listener = _Nobody()
@@ -163,7 +162,7 @@ class SimulatedDriver:
     def release(self) -> None:
         """Let machines be commanded again; what the stop has broken off stays so."""
         self._start(self.clock.now_seconds() if self.clock is not None else 0.0)
-        self.awake.set()  # what was due while they stood is due now
+        self.awake.set()  # a workpiece that was kept out may come now
 
     def close(self) -> bool:
         """Let no more workpieces come in this life of the run; the next one does not end with the cycle."""
@@ -194,8 +193,6 @@ class SimulatedDriver:
                 self.interrupted |= {(place.name, entry) for place, entry in self.tickets.values()}
                 self.tickets.clear()
             case "start", ():
-                if self.stopped and not self.failed:
-                    self.plant.faulted = False
                 self.stopped = False
             case _:
                 raise ValueError(f"a simulated cell knows no '{what}'")
@@ -226,7 +223,6 @@ class SimulatedDriver:
                         self.done[place.name] = entry
                         self._formed(str(place.completion), self.completions.acknowledged(str(place.completion), entry))
                 case PlantFault(machine, message):
-                    self.failed = True
                     self.listener.driver_fault(machine, message)
 
     def _sensor(self, at_seconds: float, signal: str, value: bool) -> None:

@@ -190,11 +190,14 @@ def test_a_run_that_was_stopped_at_the_end_of_its_cycle_is_taken_up_with_the_wor
         assert (report.state, report.delivered) == (State.DONE, tuple(range(1, 7)))
 
 
-def test_what_was_due_while_a_run_was_latched_happens_when_it_is_reset() -> None:
+def test_workpieces_come_while_a_run_is_latched() -> None:
     async def operator(host: Host) -> None:
         await asyncio.sleep(100.0)  # the first workpiece has left, and the second has not come
         host.emergency_stop("a person")
+        assert not host.driver.readings()["conveyor.part_at_entry"].value
         await asyncio.sleep(200.0)
+        assert host.situation().state is State.LATCHED
+        assert host.driver.readings()["conveyor.part_at_entry"].value
         await reset_and_resume(host)
 
     text = catalogue_path("one_robot").with_name("one_robot.plant.yaml").read_text()

@@ -20,6 +20,7 @@ from firable.executor.operating.monitor import Monitor
 from firable.executor.operating.running import Operator, RunReport, SimulatedCell, execute
 from firable.executor.operating.situation import State
 from firable.executor.operating.watched_loop import WatchedLoop
+from firable.executor.protocol.commands import Answer
 from firable.nets.diagnostics import InputError
 from firable.nets.machines.closing import close
 from firable.nets.machines.loop import ClosedLoop, Faults, Sending
@@ -27,7 +28,7 @@ from firable.nets.machines.plant_file import PlantModel, misfits, otherwise_than
 from firable.nets.net import Net
 from firable.nets.text import parse_net
 from firable.nets.verdict import Status
-from firable.semantics.trace import parse_trace
+from firable.semantics.trace import SignalChanged, parse_trace
 
 NET = """firable: 1
 cell: press
@@ -265,6 +266,35 @@ def test_a_run_that_was_paused_for_long_waits_anew() -> None:
 
     report = ran(operator=operator)
     assert (report.state, len(report.delivered)) == (State.DONE, 2)
+
+
+def test_it_changes_in_its_time_while_the_machines_stand_after_an_emergency_stop() -> None:
+    """What was pressed and let go meanwhile is told then, and not all at once when the stop is over."""
+
+    async def operator(host: Host) -> None:
+        await asyncio.sleep(9.0)  # the press is at work
+        assert "press.working" in host.marking
+        host.emergency_stop("a person")
+        await asyncio.sleep(40.5)
+        assert host.situation().state is State.LATCHED
+        assert "press.working" in host.marking
+        assert host.reset() == ()
+        while host.taking_up is None or not host.taking_up.is_final:
+            await asyncio.sleep(0.001)
+        assert not host.say("press.working", Answer.NOT_RECEIVED)
+        assert host.resume()
+
+    trace = io.StringIO()
+    report = ran(trace=trace, operator=operator)
+    assert (report.state, len(report.delivered)) == (State.DONE, 2)
+    events = parse_trace(trace.getvalue()).events
+    for signal, period, set_at in (("press.key", 3, 2), ("press.door", 9, 7)):
+        changes = [
+            (one.at_seconds, one.value) for one in events if isinstance(one, SignalChanged) and one.signal == signal
+        ]
+        assert {value for at, value in changes if 9.0 < at < 49.0} == {False, True}
+        for at, value in changes:
+            assert at % period == pytest.approx(set_at if value else 0, abs=1e-6)
 
 
 def test_the_monitor_believes_nothing_of_it() -> None:
