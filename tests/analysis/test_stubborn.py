@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from threading import Event
 from typing import Any
@@ -21,8 +22,11 @@ from firable.analysis import _engine, stubborn
 from firable.analysis.compiled import nodes_of, rows
 from firable.analysis.deadline import Deadline
 from firable.analysis.goal import Limits
+from firable.analysis.question import Known
+from firable.analysis.reduction.deciding import KnownByReduction
 from firable.analysis.spaces.reachability import explore
-from firable.analysis.stubborn import decide_by_stubborn_sets, find_deadlocks, find_firings
+from firable.analysis.stubborn import decide_by_stubborn_sets, find_deadlocks, find_firings, known_firings
+from firable.nets.catalogue.families import family_net
 from firable.nets.catalogue.processes import philosophers, philosophers_either
 from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Or, Start, parse_formula
 from firable.nets.net import ExternalGate, Net, Place, Signal, Transition
@@ -123,6 +127,33 @@ def test_a_search_for_firings_that_was_ended_goes_on(calm: int, monkeypatch: pyt
         witness = found.witness(transition.name)
         assert witness is not None
         played(net, witness)
+
+
+@pytest.mark.parametrize(
+    "know", [lambda net: known_firings(net, Limits()), lambda net: KnownByReduction(net)(Limits())]
+)
+def test_a_verdict_that_a_dead_transition_decides_is_not_kept_back_to_name_others(
+    know: Callable[[Net], Mapping[str, Known]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of three who share two tools all are never at work; and a counter fires its last transitions after ages."""
+    pairs, counter = [(who, tool) for who in "123" for tool in "ab"], family_net("counter-60")
+    marked, empty = [*(f"idle{who}" for who in "123"), "free_a", "free_b"], [*(f"busy{who}" for who in "123")]
+    places = (Place(name, marked=name in marked) for name in (*marked, *empty, "used_a", "used_b"))
+    transitions = (
+        Transition("all", permissive=tuple(empty)),
+        *(Transition(f"take{i}{j}", (f"idle{i}", f"free_{j}"), (f"busy{i}", f"used_{j}")) for i, j in pairs),
+        *(Transition(f"give{i}{j}", (f"busy{i}", f"used_{j}"), (f"idle{i}", f"free_{j}")) for i, j in pairs),
+    )
+    net = replace(counter, places=(*places, *counter.places), transitions=(*transitions, *counter.transitions))
+    walk = stubborn.FiringSearch._walk
+
+    def walked(search: stubborn.FiringSearch, turn: int) -> None:
+        assert not search.dead
+        walk(search, turn)
+
+    monkeypatch.setattr(stubborn.FiringSearch, "_walk", walked)
+    answer = know(net)["quasi-live"].answer
+    assert (answer.holds, answer.subjects) == (False, ("all",))
 
 
 def test_what_fires_for_ever_and_changes_nothing_holds_nobody_up() -> None:

@@ -265,9 +265,9 @@ def test_a_net_that_was_reduced_once_is_searched_on_and_not_reduced_again(monkey
         reduced.append(net.name)
         return reduce_for_liveness(net, limits)
 
-    def noted(search: FiringSearch, limits: Limits) -> Firings:
+    def noted(search: FiringSearch, limits: Limits, *, until_dead: bool) -> Firings:
         asked.append((search, limits))
-        return found(search, limits)
+        return found(search, limits, until_dead=until_dead)
 
     monkeypatch.setattr(deciding, "reduce_for_liveness", counted)
     monkeypatch.setattr(FiringSearch, "found", noted)
