@@ -209,10 +209,13 @@ def test_what_is_told_in_the_instant_because_nobody_could_go_by_it_leaves_nothin
 
 
 @pytest.mark.seeds
-@pytest.mark.parametrize("seed", seeds(6))
-def test_in_drawn_cells_it_leaves_nothing_out_either(seed: int) -> None:
-    cell = drawn_cell(seed)
-    for sending in Sending:
+@pytest.mark.parametrize("chunk", range(2))
+def test_in_drawn_cells_it_leaves_nothing_out_either(chunk: int) -> None:
+    cells = [(drawn_cell(seed), sending) for seed in seeds(3, chunk) for sending in Sending]
+    compared = 0
+    for cell, sending in cells:
         loop, late = told_late(cell.net, cell.plant, Faults.NONE, sending)
         if (markings := reached(loop, 20_000)) is not None and (others := reached(late, 60_000)) is not None:
             assert markings == others, cell
+            compared += 1
+    assert compared > len(cells) / 2

@@ -6,6 +6,7 @@ engineers think of has examples beside it (`test_runs_of_the_loop.py`); here are
 
 import io
 import random
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
@@ -31,7 +32,7 @@ from firable.semantics.trace import Event, Noted, parse_trace
 LINES_MAX: Final = 110
 """After so many lines of its trace a run is cut off."""
 FIRINGS_AT_ONCE_MAX: Final = 15
-MARKINGS_MAX: Final = 5000
+MARKINGS_MAX: Final = 20_000
 """A run that leaves more of its loop's markings open is followed no further."""
 OVERDUE_SECONDS: Final = 60.0
 OF_THE_NET: Final = ("fire without end", f"within {OVERDUE_SECONDS:g} s")
@@ -103,12 +104,11 @@ def failing(cell: DrawnCell) -> list[tuple[str, str]]:
 
 
 def disagreement(cell: DrawnCell, loop: ClosedLoop, seen: Run) -> str | None:
-    """The first thing of a run that its loop does not have, with what is needed to look into it."""
-    course = Course(Follower(loop, MARKINGS_MAX))
-    try:
-        words = _first_wrong(cell, course, seen)
-    except TooManyMarkingsError:
-        return None
+    """The first thing of a run that its loop does not have, with what is needed to look into it.
+
+    Raises `TooManyMarkingsError` where it is not followed to its end.
+    """
+    words = _first_wrong(cell, Course(Follower(loop, MARKINGS_MAX)), seen)
     sending = Sending.LATE if loop.unsent else Sending.AT_ONCE
     return words and f"sent {sending}: {words}\n{seen.disturbances}\n{cell}\n" + "\n".join(map(str, seen.events))
 
@@ -134,13 +134,17 @@ def _first_wrong(cell: DrawnCell, course: Course, seen: Run) -> str | None:
     return None
 
 
-def disagreements(seed: int) -> list[str]:
-    """What the runs of a drawn cell do and its loops do not, however commands are sent."""
-    cell, found = drawn_cell(seed), list[str | None]()
+def disagreements(seed: int) -> Iterator[str | None]:
+    """What the runs of a drawn cell do and its loops do not, however commands are sent: of each run that is followed to
+    its end the first such thing, or an empty text; of each other None."""
+    cell = drawn_cell(seed)
     for faults in (Faults.NONE, Faults.FOR_GOOD) if failing(cell) else (Faults.NONE,):
         seen = run(cell, seed, faults=faults)
-        found += [disagreement(cell, close(cell.net, cell.plant, faults, sending), seen) for sending in Sending]
-    return [words for words in found if words]
+        for sending in Sending:
+            try:
+                yield disagreement(cell, close(cell.net, cell.plant, faults, sending), seen) or ""
+            except TooManyMarkingsError:
+                yield None
 
 
 @pytest.fixture(autouse=True)
@@ -149,9 +153,12 @@ def runs_in_circles_end_soon(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.seeds
-@pytest.mark.parametrize("seed", seeds(6))
-def test_runs_of_a_drawn_cell_are_runs_of_its_loop(seed: int) -> None:
-    assert not (found := disagreements(seed)), "\n\n".join(found)
+@pytest.mark.parametrize("chunk", range(2))
+def test_runs_of_drawn_cells_are_runs_of_their_loops(chunk: int) -> None:
+    found = [words for seed in seeds(3, chunk) for words in disagreements(seed)]
+    followed = [words for words in found if words is not None]
+    assert not any(followed), "\n\n".join(followed)
+    assert len(followed) > len(found) / 2
 
 
 @pytest.mark.seeds
@@ -166,10 +173,10 @@ def test_the_loop_of_a_drawn_cell_is_what_its_plant_file_says(seed: int) -> None
 
 @pytest.mark.parametrize("seed", TOLD_LATE)
 def test_a_loop_that_tells_nothing_late_lacks_a_run_of_a_drawn_cell(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert not disagreements(seed)
+    cell, before = drawn_cell(seed), [*disagreements(seed)]
     monkeypatch.setattr(Telling, "told_late", lambda *_: frozenset())
-    found, cell = disagreements(seed), drawn_cell(seed)
-    assert found
+    found = {words: whole for whole, words in zip(before, disagreements(seed), strict=True) if words}
+    assert set(found.values()) == {""}, "the loop that tells of it has the whole run"
     assert all(cell.net_text in words and cell.plant_text in words for words in found)
 
 

@@ -66,13 +66,16 @@ def test_a_cell_with_wires_does_what_its_loop_does(
 
 
 @pytest.mark.seeds
-@pytest.mark.parametrize("seed", seeds(6))
-def test_what_a_drawn_cell_with_wires_does_is_in_its_loop(seed: int) -> None:
-    cell = drawn_cell(seed)
-    for sending in Sending:
+@pytest.mark.parametrize("chunk", range(2))
+def test_what_drawn_cells_with_wires_do_is_in_their_loops(chunk: int) -> None:
+    cells = [(drawn_cell(seed), sending) for seed in seeds(3, chunk) for sending in Sending]
+    compared = 0
+    for cell, sending in cells:
         if (markings := reached(close(cell.net, cell.plant, sending=sending), 20_000)) is not None:
             found, _ = PhysicalCell(cell.net, cell.plant, sending).runs(2_000)
             assert not {run for marking, run in found.items() if marking not in markings}, cell
+            compared += 1
+    assert compared > len(cells) / 2
 
 
 @pytest.mark.parametrize(
