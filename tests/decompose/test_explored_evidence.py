@@ -9,7 +9,7 @@ from support.bundle_mutants import evidence_mutants, line_mutants, net_mutants, 
 from support.free_parts import freed
 from support.layered_nets import cells_in_a_line
 from support.owned_nets import owned_net
-from support.remembered import answered
+from support.remembered import UNORDERED, Answers, answered
 
 from firable.analysis.check import check
 from firable.decompose.bundling import make_bundle
@@ -397,11 +397,9 @@ def test_an_answer_that_refutes_is_refused_and_a_missing_one_only_claims(kind: s
     assert len([name for name in late if name.startswith("explored.")]) == of
 
 
-@pytest.mark.parametrize(
-    "change", [lambda said: said[:-1], lambda said: said[:-2], lambda said: (*said[2:], *said[:2])]
-)
+@pytest.mark.parametrize("change", UNORDERED)
 def test_answers_that_are_not_to_one_obligation_after_the_other_show_nothing(
-    change: Callable[[tuple[str, ...]], tuple[str, ...]],
+    change: Callable[[Answers], Answers],
 ) -> None:
     bundle = bundled("shuttle")
     examination = Examination(bundle)

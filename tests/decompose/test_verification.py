@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from support.bundle_mutants import decomposition_mutants, evidence_mutants, line_mutants, verdict_mutants
 from support.examples import some
-from support.remembered import answered, bundled, rests_on_an_obligation
+from support.remembered import UNORDERED, Answers, answered, bundled, rests_on_an_obligation
 
 from firable.analysis.check import check
 from firable.analysis.induction.smt import symbol
@@ -132,7 +132,7 @@ def test_another_theorem_on_the_protocol_is_refused() -> None:
 
 @pytest.mark.usefixtures("remembering")
 def test_the_theorem_on_the_protocol_needs_an_answer_to_each_of_its_obligations() -> None:
-    def judged(change: Callable[[tuple[str, ...]], tuple[str, ...]]) -> Examination:
+    def judged(change: Callable[[Answers], Answers]) -> Examination:
         examination = Examination(bundled("conceptual_one_robot"))
         check_protocol(examination, "cvc5", lambda *of: change(answered(*of)), 10_000)
         return examination
@@ -143,7 +143,7 @@ def test_the_theorem_on_the_protocol_needs_an_answer_to_each_of_its_obligations(
         judged(lambda said: (*said[:-1], "sat"))
     late = [one for one in judged(lambda said: (*said[:-1], "unknown")).checked.values() if not one.shown]
     assert [(one.verdict.name, one.method, one.only_claimed) for one in late] == [(names[-1], NOTHING, "cvc5 gave up")]
-    for changed in (lambda said: said[:-1], lambda said: said[:-2], lambda said: (*said[2:], *said[:2])):
+    for changed in UNORDERED:
         with pytest.raises(NotShownError, match=r"does not answer one obligation of 'protocol\.smt2' after the other"):
             judged(changed)
 
@@ -353,11 +353,9 @@ def test_a_file_of_other_obligations_is_told_by_the_first_that_is_another(
         compared(Examination(mutant), cut_of("workshop-1"), "eq7")
 
 
-@pytest.mark.parametrize(
-    "changed", [lambda said: said[:-1], lambda said: said[:-2], lambda said: (*said[2:], *said[:2]), lambda _: ()]
-)
+@pytest.mark.parametrize("changed", UNORDERED)
 def test_answers_that_are_not_to_one_obligation_after_the_other_show_nothing(
-    changed: Callable[[tuple[str, ...]], tuple[str, ...]],
+    changed: Callable[[Answers], Answers],
 ) -> None:
     examination = Examination(bundled("workshop-1"))
     with pytest.raises(NotShownError, match=r"does not answer one obligation of 'eq7\.smt2' after the other"):

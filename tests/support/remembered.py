@@ -1,6 +1,6 @@
 """Bundles, documents, answers of the second solver and what the checker finds, once a process for many mutants."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache, lru_cache
 
 from firable.analysis.check import check
@@ -12,11 +12,22 @@ from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net, family_net
 from firable.nets.verdict import Verdict
 
+Answers = tuple[str, ...]
+"""The name of each obligation of a file, and behind it what a solver says of it."""
+
+UNORDERED: tuple[Callable[[Answers], Answers], ...] = (
+    lambda said: said[:-1],
+    lambda said: said[:-2],
+    lambda said: (*said[2:], *said[:2]),
+    lambda _: (),
+)
+"""What makes of answers some that are not to one obligation of their file after the other."""
+
 _found: dict[tuple[str, int], tuple[CheckedRecord, ...]] = {}
 
 
 @lru_cache(512)
-def answered(text: str, timeout_ms: int) -> tuple[str, ...]:
+def answered(text: str, timeout_ms: int) -> Answers:
     """What cvc5 answers to a text."""
     return by_cvc5(text, timeout_ms)
 

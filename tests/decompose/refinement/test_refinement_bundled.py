@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from support.bundle_mutants import evidence_mutants, line_mutants, net_mutants, verdict_mutants
 from support.examples import examples, some
 from support.random_tasks import nested, random_conceptual, random_task
-from support.remembered import examined, read
+from support.remembered import UNORDERED, Answers, examined, read
 
 from firable.analysis import branching_bisimilar, explore, report_on
 from firable.analysis.check import check
@@ -304,7 +304,7 @@ def test_whatever_is_related_is_bisimilar_though_refine_would_refuse_it() -> Non
     assert wrong > 5
 
 
-def judged(change: Callable[[tuple[str, ...]], tuple[str, ...]]) -> Examination:
+def judged(change: Callable[[Answers], Answers]) -> Examination:
     """The bundle checked with other answers to its obligations."""
 
     def answers(text: str, timeout_ms: int) -> tuple[str, ...]:
@@ -355,11 +355,9 @@ def test_what_rests_on_a_document_that_was_not_checked_in_time_is_only_claimed(
 
 
 @pytest.mark.usefixtures("remembering")
-@pytest.mark.parametrize(
-    "change", [lambda said: said[:-1], lambda said: said[:-2], lambda said: (*said[2:], *said[:2])]
-)
+@pytest.mark.parametrize("change", UNORDERED)
 def test_answers_that_are_not_to_one_obligation_after_the_other_show_no_refinement(
-    change: Callable[[tuple[str, ...]], tuple[str, ...]],
+    change: Callable[[Answers], Answers],
 ) -> None:
     with pytest.raises(NotShownError, match=r"does not answer one obligation of 'refinement\.smt2' after the other"):
         judged(change)
