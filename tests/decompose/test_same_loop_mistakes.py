@@ -64,8 +64,10 @@ def test_cameras_that_are_taken_for_each_other_are_a_difference(monkeypatch: pyt
     with pytest.raises(DiffersError, match="that show the signals are others"):
         compare(Plant(net, model), replace(loop, shown=swapped))
     monkeypatch.setattr(Laws, "verdict", lambda self, station, good: verdict(self, station, good=not good))
-    with pytest.raises(DiffersError, match="that show the signals are others"):
-        compare(Plant(net, model), close(net, model, sending=Sending.LATE))
+    mistaken = close(net, model, sending=Sending.LATE)
+    assert dict(mistaken.shown) == swapped
+    with pytest.raises(DiffersError, match="'accept' does not go as the plant file says"):
+        compare(Plant(net, model), replace(mistaken, shown=loop.shown))
 
 
 def spoiling(change: Callable[[Case], Case | None]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
