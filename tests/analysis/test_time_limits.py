@@ -140,9 +140,12 @@ def test_a_robot_that_was_not_stopped_is_commanded_again_while_it_moves() -> Non
     assert any(fired[0] in named(FAULTS) for fired in verdict.witness.firings)
 
 
+LIMITED = ("until: touch,    description: grasping on CV1", "until: touch, within: 2s, description: grasping on CV1")
+
+
 def test_a_grip_that_is_tried_again_may_have_been_done_a_moment_before_the_timeout_and_its_stop() -> None:
     net = edited(
-        ("until: touch,    description: grasping on CV1", "until: touch, within: 2s, description: grasping on CV1"),
+        LIMITED,
         ("  t2-a:", "  t1-j: {from: robot.grasp_cv1_fault, to: robot.grasp_cv1, if: robot.reset}\n  t2-a:"),
         ("      to_mc:\n", "      grasp_cv1_fault: {send: {machine: R, command: STOP}}\n      to_mc:\n"),
     )
@@ -154,6 +157,27 @@ def test_a_grip_that_is_tried_again_may_have_been_done_a_moment_before_the_timeo
     assert run[done].endswith("/robot.touch-late")
     assert any(name.startswith("robot.grasp_cv1_timeout") for name in run[done:])
     assert run[-1].endswith("/R-holds")
+
+
+@pytest.mark.parametrize("gates", [", unless: robot.in_hand", ""], ids=["its hand is looked at", "it is not"])
+def test_a_grip_may_be_tried_again_where_the_robot_is_at_rest_and_its_hand_is_seen_to_be_empty(gates: str) -> None:
+    again = f"  t1-j: {{from: robot.grasp_cv1_fault, to: robot.grasp_cv1, if: robot.reset{gates}}}\n"
+    done = "{from: [robot.grasp_cv1_fault, conveyor.cv1_wait], to: [robot.to_mc, conveyor.cv1], if: robot.in_hand}"
+    net = edited(
+        LIMITED,
+        ("inputs: reset\n", "inputs: [reset, in_hand]\n"),
+        ("  t2-a:", f"{again}  G3-late: {done}\n  t2-a:"),
+        ("      to_mc:\n", "      grasp_cv1_fault: {send: {machine: R, command: HALT}, until: still}\n      to_mc:\n"),
+    )
+    at_once = "      STOP:    {does: stop}\n  MC:\n"
+    plant = catalogue_path("one_robot_timed").with_name("one_robot_timed.plant.yaml").read_text("utf-8")
+    assert plant.count(at_once) == 1
+    plant = plant.replace(at_once, f"      HALT:    {{does: stop, takes_s: 0.3}}\n{at_once}")
+    report = check_loop(net, parse_plant(f"{plant}  robot.in_hand: {{holding: R}}\n"))
+    if gates:
+        assert all(verdict.holds for verdict in report.verdicts)
+    else:
+        assert report.verdict("loop.accidents").status is Status.VIOLATED
 
 
 def test_a_timer_that_only_its_fault_transition_reads_is_no_place_of_the_loop() -> None:
