@@ -16,6 +16,7 @@ from support.interrupting import ended
 from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.producing import spaces
 from firable.analysis.goal import Limits
+from firable.analysis.methods import Method
 from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
 from firable.cli.main import main
 from firable.decompose import bundling
@@ -327,15 +328,21 @@ def test_the_parts_of_what_is_asked_of_a_loop_are_told_by_name_to_who_asks_for_a
 ) -> None:
     """They are many, and have names that stand in no file."""
     monkeypatch.setattr("firable.analysis.check.FIRST_MARKINGS", 200)
-    monkeypatch.setattr("firable.analysis.check.SPACES", {})
-    limits = ["--max-markings", "300", "--max-seconds", "6", "--no-cache"]
+    for others in ("SPACES", "FIRST_KNOWERS"):
+        monkeypatch.setattr(f"firable.analysis.check.{others}", {})
+    # It decides each of them, however long it takes, and of what is no such question nobody decides anything.
+    monkeypatch.setattr("firable.analysis.check.GOAL_LANES", ((Method.REDUCTION,),))
+    monkeypatch.setattr("firable.analysis.check.FORMULA_LANES", ())
+    limits = ["--max-markings", "300", "--no-cache"]
     assert main(["check", CELL, "--machines", PLANT, *limits]) == 3
     brief = capsys.readouterr().out
     assert "property.loop.completion.1: " not in brief
-    assert re.search(r"asked one by one: \d+ questions about the loop; -v tells of each", brief)
+    told = re.search(r"asked one by one: (\d+) questions about the loop; -v tells of each", brief)
+    assert told is not None
     assert main(["check", CELL, "--machines", PLANT, *limits, "-v"]) == 3
     whole = capsys.readouterr().out
     assert "property.loop.completion.1: " in whole
+    assert len(re.findall(r"^  property\.\S+: ", whole, re.MULTILINE)) == int(told[1])
     assert "-v tells of each" not in whole
 
 
