@@ -33,7 +33,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import chain
+from itertools import chain, islice
 from types import MappingProxyType
 from typing import Final
 
@@ -49,6 +49,8 @@ from firable.nets.yaml_tree import Path
 VARIANTS_MAX: Final = 4096
 """How many variants one transition may have before it is asked what controllers are told of it; it doubles with each
 completion that it clears."""
+TOLD_MAX: Final = 2**15
+"""How many with all that: where it clears completions of which there is news, each may triple them."""
 
 
 def close(net: Net, model: PlantModel, faults: Faults = Faults.NONE, sending: Sending = Sending.AT_ONCE) -> ClosedLoop:
@@ -270,8 +272,11 @@ class _Closing:
             commanded.add(place.command.machine)
             taken.append(place)
             if len(moments) + len(ended) > VARIANTS_MAX:
-                raise _too_many(transition)
-        for moment in self.told(moments, taken):
+                raise _too_many(transition, VARIANTS_MAX)
+        told = tuple(islice(self.told(moments, taken), TOLD_MAX + 1))
+        if len(told) + len(ended) > TOLD_MAX:
+            raise _too_many(transition, TOLD_MAX)
+        for moment in told:
             yield moment.transition("/".join((transition.name, *moment.tags)), _told(transition, moment))
         for moment in ended:
             yield self.accident("/".join((transition.name, *moment.tags)), _told(transition, moment), moment)
@@ -499,8 +504,8 @@ def _told(transition: Transition, moment: Moment) -> str:
     return f"{transition.description}: {more}" if transition.description and more else transition.description or more
 
 
-def _too_many(transition: Transition) -> InputError:
-    message = f"'{transition.name}' sends commands with more than {VARIANTS_MAX:,} outcomes in one firing"
+def _too_many(transition: Transition, most: int) -> InputError:
+    message = f"'{transition.name}' sends commands with more than {most:,} outcomes in one firing"
     hint = "send them one after the other, in transitions of their own"
     return InputError([Diagnostic("F3007", message, hint, ("transitions", transition.name, "to"))])
 

@@ -15,7 +15,7 @@ from firable.nets.machines.closing import close
 from firable.nets.machines.loop import ClosedLoop, Faults, Sending
 from firable.nets.machines.moment import NOTHING, Case, each
 from firable.nets.machines.plant_file import parse_plant
-from firable.nets.net import Command, Controller, Net, Place, Signal, SignalKind, Transition
+from firable.nets.net import Command, Controller, ExternalGate, Net, Place, Signal, SignalKind, Transition
 from firable.nets.printing import format_net
 from firable.nets.text import parse_net
 from firable.nets.verdict import Status
@@ -225,6 +225,32 @@ def test_a_firing_with_more_outcomes_than_the_loop_can_tell_apart_is_refused() -
     with pytest.raises(InputError) as refusal:
         close(net, plant)
     assert [(one.code, one.subject) for one in refusal.value.diagnostics] == [("F3007", ("transitions", "all", "to"))]
+
+
+def test_a_firing_with_more_outcomes_than_that_with_what_controllers_are_told_of_it_is_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Five machines have 32, and of each completion that somebody looks at there may be news when it is cleared."""
+    machines = range(5)
+    commands = "".join(f"  M{i}: {{commands: {{GO: {{does: work, takes_s: 1}}}}}}\n" for i in machines)
+    plant = parse_plant(
+        "firable_plant: 1\nplant: many\nstations: [s]\narrivals: {station: s, every_s: 5}\ndepartures: {station: s}\n"
+        f"machines:\n{commands}sensors: {{}}\n"
+    )
+    working = [Place(f"c.p{i}", "c", command=Command(f"M{i}", "GO"), completion=f"c.done{i}") for i in machines]
+    signals = [Signal(f"c.done{i}", "c", SignalKind.COMPLETION) for i in machines]
+    marked, names = (Place("c.from", "c", marked=True), Place("c.calm", "c", marked=True)), [p.name for p in working]
+    nobody = tuple(ExternalGate(f"c.done{i}", wanted=False) for i in machines)
+    transitions = (
+        Transition("all", ("c.from",), tuple(names)),
+        Transition("watch", ("c.calm",), ("c.seen",), external=nobody),
+    )
+    net = Net("many", (*marked, Place("c.seen", "c"), *working), transitions, tuple(signals), (Controller("c"),))
+    assert 600 < len(close(net, plant).variants["all"]) < 1_000
+    monkeypatch.setattr("firable.nets.machines.closing.TOLD_MAX", 600)
+    with pytest.raises(InputError, match=r"F3007.*'all' sends commands with more than 600 outcomes") as refusal:
+        close(net, plant)
+    assert [one.subject for one in refusal.value.diagnostics] == [("transitions", "all", "to")]
 
 
 def test_a_net_with_a_name_that_the_plant_takes_is_refused() -> None:
