@@ -187,7 +187,8 @@ class Relation:
         empty = [_not(self.shown(place, {})) for place in of.inhibitive]
         free = [_not(self.shown(place, {})) for place in of.outputs]
         there = _and([*full, *empty, *free]) if of.openable and not of.self_loops else "false"
-        no_contact = f"(or {' '.join([*map(_not, [*full, *empty]), _and(free)])})"
+        around = _and(_not(self.shown(place, {})) for place in of.outputs if place not in of.inputs)
+        no_contact = f"(or {' '.join([*map(_not, [*full, *empty]), around])})"
         after = [
             *(self.shown(place, then) for place in of.outputs),
             *(_not(self.shown(place, then)) for place in of.inputs),

@@ -20,6 +20,7 @@ from support.remembered import UNORDERED, Answers, examined, read
 from firable.analysis import branching_bisimilar, explore, report_on
 from firable.analysis.check import check
 from firable.decompose.bundling import make_bundle
+from firable.decompose.refinement import sealing
 from firable.decompose.refinement.binding import bindings
 from firable.decompose.refinement.closed import BlockProof, closed, prove_block
 from firable.decompose.refinement.evidence import conditions
@@ -302,6 +303,51 @@ def test_whatever_is_related_is_bisimilar_though_refine_would_refuse_it() -> Non
             assert branching_bisimilar(*graphs, names, visible, divergence=settles), seed
     assert related > 8
     assert wrong > 5
+
+
+LOOPING = """\
+firable: 1
+cell: looping
+controllers:
+  system:
+    coordinator: true
+    start: [a, b, p]
+    places:
+      one: {task: {name: fetch, arm: a, shelf: b}}
+      a:   {opens: {to: x.a, machine: A}}
+      b:   {opens: {to: y.b, machine: B}}
+      p:
+      q:
+      r:
+      s:
+  x:
+  y:
+transitions:
+  t1: {from: [system.a, system.b, system.p], to: [system.one, system.r]}
+  t2: {from: system.one, to: system.a}
+  t3: {from: system.p, to: system.q}
+  t4: {from: system.q, to: system.p}
+  t5: {from: system.r, to: system.s}
+  t6: {from: system.s, to: system.r}
+"""
+
+
+def test_a_transition_that_frees_what_it_takes_is_not_opened_to_one_that_can_fire(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It never fires, while opened it takes the shelf and a move of the task frees it; that is no contact of either."""
+    net, tasks = parse_net(LOOPING), {"fetch": parse_tasks(WORK)["fetch"]}
+    t1 = net.transition("t1")
+    net = replace(net, transitions=(replace(t1, outputs=(*t1.outputs, "system.b")), *net.transitions[1:]))
+    detailed = named(net, open_tasks(net, bindings(net, tasks), tasks)).net
+    assert refuted(Named(Opening(net, tasks)), detailed) == ["follows.G1"]
+    monkeypatch.setattr(sealing, "by_z3", lambda text, _: ("", "unsat") * text.count("(check-sat)"))
+    bundle = make_bundle(check(detailed), origin=Origin(net, tasks, (prove_block(tasks["fetch"]),)))
+    by_name = {verdict.name: verdict for verdict in bundle.verdicts}
+    assert by_name["refinement.carried.reversible"].holds
+    assert not by_name["reversible"].holds
+    with pytest.raises(InputError, match=r"F6002.*'follows\.G1' of 'refinement\.smt2' is refuted"):
+        check_bundle(bundle)
 
 
 def judged(change: Callable[[Answers], Answers]) -> Examination:
