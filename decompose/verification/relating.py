@@ -186,7 +186,7 @@ class Relation:
         full = [self.shown(place, {}) for place in (*of.inputs, *of.permissive)]
         empty = [_not(self.shown(place, {})) for place in of.inhibitive]
         free = [_not(self.shown(place, {})) for place in of.outputs]
-        there = _and([*full, *empty, *free]) if of.openable and not of.self_loops else "false"
+        there = _and([*full, *empty, *free]) if of.openable else "false"
         around = _and(_not(self.shown(place, {})) for place in of.outputs if place not in of.inputs)
         no_contact = f"(or {' '.join([*map(_not, [*full, *empty]), around])})"
         after = [
@@ -214,7 +214,7 @@ class Relation:
             *(_symbol(place[name]) for name in (*of.inputs, *of.permissive)),
             *(_not(_symbol(place[name])) for name in (*of.outputs, *of.inhibitive) if name in place),
         ]
-        there = _and([_symbol(self.named.places[block.key]), *alone]) if of.openable and not of.self_loops else "false"
+        there = _and([_symbol(self.named.places[block.key]), *alone]) if of.openable else "false"
         steps = {place[name]: False for name in of.inputs} | {place[name]: True for name in of.outputs if name in place}
         others = (self.key_of[p] for p in then if p not in place.values())
         as_alone = all(then.get(p) == steps.get(p) for p in place.values()) and all(
@@ -246,7 +246,7 @@ class Relation:
 
     @staticmethod
     def _firable(t: Transition) -> str:
-        if not t.openable or t.self_loops:
+        if not t.openable:
             return "false"
         full, empty = (*t.inputs, *t.permissive), (*t.outputs, *t.inhibitive)
         return _and([*map(_symbol, full), *(_not(_symbol(place)) for place in empty)])
