@@ -115,7 +115,7 @@ class _Reader:
 
     def next(self) -> str:
         token = self.tokens[self.position]
-        self.position += 1
+        self.position += bool(token)  # nothing is behind the end
         return token
 
     def expect(self, *tokens: str) -> None:
