@@ -8,9 +8,9 @@
     term   ::= |VARIABLE| | WORD | true | false | (not term) | (and term term+) | (or term term+) | (= term term)
 
 where no operand of an `and` or an `or` stands there twice or is a constant, and none of a `not` is one or a `not`. Each
-command has a line; a term that is longer than a line, or holds one that is, has a line for each operand, indented by
-its depth. Variables are declared in the order in which they first stand in what is asserted, definitions written out;
-these are numbered from 1, in their order.
+command has a line; a term that is longer than a line has a line for each operand, indented by its depth. Variables are
+declared in the order in which they first stand in what is asserted, definitions written out; these are numbered from 1,
+in their order.
 
 What a solver is asked could be bent by a command in between: an option, an assertion outside of the blocks, a variable
 that is declared and then defined. So the reader knows no other command, a word is one that the block has defined
@@ -72,21 +72,19 @@ class _Term:
         self.operator, self.begins_line = operator, begins_line
         self.operands: list[Formula] = []
         self.length = len("(") + len(operator)  # on one line
-        self.has_long = False
         self.breaks: set[bool] = set()  # whether operands begin a line
 
-    def take(self, value: Formula, length: int, *, begins_line: bool, is_long: bool) -> None:
+    def take(self, value: Formula, length: int, *, begins_line: bool) -> None:
         self.operands.append(value)
         self.length += len(" ") + length
-        self.has_long |= is_long
         self.breaks.add(begins_line)
 
-    def laid_out(self) -> bool:
-        """Whether it has more than one line; raises `ReadingError` where it has and needs not, or needs and has not."""
-        is_long = self.has_long or self.length + len(")") > _LINE_MAX
-        if self.breaks != {is_long}:
+    def ended(self) -> int:
+        """Its length on one line; raises `ReadingError` where it has more and needs not, or needs more and has not."""
+        length = self.length + len(")")
+        if self.breaks != {length > _LINE_MAX}:
             raise ReadingError(f"the lines of '{self.operator}' are not as they are written")
-        return is_long
+        return length
 
 
 class _Reader:
@@ -189,11 +187,11 @@ class _Reader:
             if token == "(":
                 stack.append(_Term(self.next(), begins_line))
                 continue
-            length, is_long = len(token), False
+            length = len(token)
             if token == ")" and stack:
                 ended = stack.pop()
                 value, begins_line = self._applied(ended.operator, ended.operands), ended.begins_line
-                length, is_long = ended.length + 1, ended.laid_out()
+                length = ended.ended()
             elif token in declared:
                 names.append(token)
                 value = declared[token]
@@ -206,7 +204,7 @@ class _Reader:
                 raise ReadingError(f"{token!r} is nothing that was declared")
             if not stack:
                 return value
-            stack[-1].take(value, length, begins_line=begins_line, is_long=is_long)
+            stack[-1].take(value, length, begins_line=begins_line)
 
     def _applied(self, operator: str, operands: list[Formula]) -> Formula:
         match operator, len(operands):
