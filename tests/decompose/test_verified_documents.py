@@ -2,13 +2,17 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from support.remembered import answered, bundled, examined, rests_on_an_obligation
 
 from firable.analysis.check import check
 from firable.analysis.evidence.checking.checker import CheckedRecord
-from firable.analysis.evidence.document import Document, document_from_text
+from firable.analysis.evidence.checking.obligation import Obligation
+from firable.analysis.evidence.claims import ClaimKind
+from firable.analysis.evidence.document import Document, Record, document_from_text
+from firable.analysis.evidence.refusal import TimeIsOverError
 from firable.analysis.spaces.reachability import Budget
 from firable.decompose.verification import documents
 from firable.decompose.verification.checked import Examination
@@ -21,6 +25,7 @@ from firable.nets.catalogue import family_net
 from firable.nets.diagnostics import InputError
 from firable.nets.right_to_run import CHECKED
 from firable.nets.verdict import Status, Verdict, Weight
+from firable.semantics.trace import Discipline
 
 
 def test_a_solver_that_cannot_read_an_obligation_of_a_document_is_no_internal_error(
@@ -67,6 +72,95 @@ def test_a_bundle_without_documents_is_refused() -> None:
     bare = tuple(replace(v, evidence=tuple(f for f in v.evidence if f in kept)) for v in bundle.verdicts)
     with pytest.raises(InputError, match="'deadlock-free' is said to be proved, without evidence"):
         check_bundle(replace(bundle, verdicts=bare, evidence=kept))
+
+
+def told(bundle: Bundle, change: Callable[[Document], Document]) -> Bundle:
+    """The bundle with another document on its net."""
+    file = "check.evidence.json"
+    text = change(document_from_text(bundle.evidence[file], file)).to_text()
+    return replace(bundle, evidence={**bundle.evidence, file: text})
+
+
+@pytest.mark.usefixtures("remembering")
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (
+            lambda of: replace(of, records=(*of.records, Record("query.more", True, (), "no time", "deadlock"))),
+            "speaks of 'query.more', as no bundle does",
+        ),
+        (
+            lambda of: replace(of, records=(*of.records, Record("property.more", True, (), "no time"))),
+            "the evidence on 'property.more' belongs to no verdict",
+        ),
+        (lambda of: replace(of, records=(*of.records, Record("", True, ()))), "has a record that claims nothing"),
+        (lambda of: unnamed(of, ClaimKind.NEVER), "answers a question that no verdict asks"),
+        (lambda of: unnamed(of, ClaimKind.ALWAYS_POSSIBLE), "claims '.*' of no verdict"),
+    ],
+)
+def test_a_document_that_says_more_or_of_something_else_is_refused(
+    change: Callable[[Document], Document], says: str
+) -> None:
+    with pytest.raises(InputError, match=says):
+        check_bundle(told(bundled("conceptual_one_robot"), change))
+
+
+def apart(bundle: Bundle, change: Callable[[Document], Document]) -> Bundle:
+    """The bundle with a document of its own, changed, on a verdict that no net must have to run."""
+    document = document_from_text(bundle.evidence["check.evidence.json"])
+    live = change(replace(document, records=tuple(r for r in document.records if r.name == "live")))
+    rest = told(bundle, lambda of: replace(of, records=tuple(r for r in of.records if r.name != "live")))
+    verdicts = tuple(replace(v, evidence=("live.evidence.json",)) if v.name == "live" else v for v in bundle.verdicts)
+    return replace(rest, verdicts=verdicts, evidence={**rest.evidence, "live.evidence.json": live.to_text()})
+
+
+@pytest.mark.usefixtures("remembering")
+def test_a_document_on_another_net_or_on_steps_shows_nothing() -> None:
+    bundle = bundled("conceptual_one_robot")
+    assert all(one.shown for one in check_bundle(apart(bundle, lambda of: of)))
+    with pytest.raises(InputError, match=r"'live\.evidence\.json' is about another net"):
+        check_bundle(apart(bundle, lambda of: replace(of, net=replace(of.net, name="other"))))
+    with pytest.raises(InputError, match=r"'live\.evidence\.json' is about another discipline"):
+        check_bundle(apart(bundle, lambda of: replace(of, discipline=Discipline.STEP)))
+
+
+def unnamed(document: Document, kind: ClaimKind) -> Document:
+    """A document with a claim of this kind besides, which belongs to no verdict."""
+    claim = next(one for record in document.records for one in record.shown if one[0].kind is kind)
+    return replace(document, records=(*document.records, Record("", True, (claim,))))
+
+
+@pytest.mark.usefixtures("remembering")
+def test_a_document_that_is_spelled_otherwise_is_refused() -> None:
+    bundle, file = bundled("conceptual_one_robot"), "check.evidence.json"
+    text = bundle.evidence[file].replace('":', '" :', 1)
+    with pytest.raises(InputError, match=r"'check\.evidence\.json' is not as it was written"):
+        check_bundle(replace(bundle, evidence={**bundle.evidence, file: text}))
+
+
+@pytest.mark.usefixtures("remembering")
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"status": Status.VIOLATED}, "'live' is violated, and the evidence says otherwise"),
+        ({"evidence": ()}, "'live' does not name the evidence on it"),
+        ({"statement": "all is well"}, "'live' says something else"),
+    ],
+)
+def test_a_verdict_is_told_for_what_of_it_is_not_shown(changes: dict[str, Any], says: str) -> None:
+    bundle = bundled("conceptual_one_robot")
+    verdicts = tuple(replace(v, **changes) if v.name == "live" else v for v in bundle.verdicts)
+    with pytest.raises(InputError, match=says):
+        check_bundle(replace(bundle, verdicts=verdicts))
+
+
+@pytest.mark.usefixtures("remembering")
+def test_an_obligation_that_takes_too_long_to_be_written_is_not_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    def late(*_: object, **__: object) -> Iterator[Obligation]:
+        raise TimeIsOverError("the time was over")
+
+    monkeypatch.setattr(documents, "obligations", late)
+    assert all(one.shown for one in check_bundle(bundled("conceptual_one_robot")))
 
 
 def without_evidence_on(bundle: Bundle, *names: str) -> Bundle:
