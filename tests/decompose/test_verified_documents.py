@@ -8,9 +8,16 @@ import pytest
 from support.remembered import answered, bundled, examined, rests_on_an_obligation
 
 from firable.analysis.check import check
+from firable.analysis.evidence.certificate import (
+    Continuation,
+    FiringSequence,
+    InductiveInvariant,
+    Labelling,
+    Markings,
+)
 from firable.analysis.evidence.checking.checker import CheckedRecord
 from firable.analysis.evidence.checking.obligation import Obligation
-from firable.analysis.evidence.claims import ClaimKind
+from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.analysis.evidence.document import Document, Record, document_from_text
 from firable.analysis.evidence.refusal import TimeIsOverError
 from firable.analysis.spaces.reachability import Budget
@@ -23,6 +30,7 @@ from firable.decompose.verification.words import SENTENCES
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import family_net
 from firable.nets.diagnostics import InputError
+from firable.nets.formula import Deadlock
 from firable.nets.right_to_run import CHECKED
 from firable.nets.verdict import Status, Verdict, Weight
 from firable.semantics.trace import Discipline
@@ -118,6 +126,9 @@ def apart(bundle: Bundle, change: Callable[[Document], Document]) -> Bundle:
 def test_a_document_on_another_net_or_on_steps_shows_nothing() -> None:
     bundle = bundled("conceptual_one_robot")
     assert all(one.shown for one in check_bundle(apart(bundle, lambda of: of)))
+    twice = apart(bundle, lambda of: of).evidence["live.evidence.json"]
+    with pytest.raises(InputError, match="speaks of 'live', as no bundle does"):
+        check_bundle(replace(bundle, evidence={**bundle.evidence, "live.evidence.json": twice}))
     with pytest.raises(InputError, match=r"'live\.evidence\.json' is about another net"):
         check_bundle(apart(bundle, lambda of: replace(of, net=replace(of.net, name="other"))))
     with pytest.raises(InputError, match=r"'live\.evidence\.json' is about another discipline"):
@@ -161,6 +172,31 @@ def test_an_obligation_that_takes_too_long_to_be_written_is_not_asked_again(monk
 
     monkeypatch.setattr(documents, "obligations", late)
     assert all(one.shown for one in check_bundle(bundled("conceptual_one_robot")))
+
+
+def test_whether_a_set_is_closed_is_asked_again_of_each_set_and_of_each_begin_of_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    bundle, file = bundled("conceptual_one_robot"), "check.evidence.json"
+    (first, second), begin = (Markings((1, 2)), Markings((1, 2))), (("t1",),)
+    whole, part, run = Labelling(first), Continuation(begin, Labelling(first)), FiringSequence(begin)
+    invariant = InductiveInvariant()
+    shown = [whole, whole, Labelling(second), part, part, Continuation((), Labelling(first)), run, run]
+    shown += [Continuation(begin, invariant)] * 2
+    claim, asked = Claim(ClaimKind.NEVER, Deadlock()), list[bool]()
+    records = tuple(Record("", True, ((claim, one),)) for one in shown)
+    document = Document(bundle.net, Discipline.INTERLEAVING, records)
+
+    def obligations(*_: object, closed: bool) -> tuple[Obligation, ...]:
+        asked.append(closed)
+        return ()
+
+    monkeypatch.setattr(documents, "document_from_text", lambda *_: document)
+    monkeypatch.setattr(documents, "check_document", lambda *_, **__: ())
+    monkeypatch.setattr(documents, "obligations", obligations)
+    examination = Examination(replace(bundle, evidence={file: document.to_text()}))
+    documents.checked_document(examination, file, bundle.net, answered, 10_000)
+    assert asked == [False, True, False, False, True, False, False, False, False, False]
 
 
 def without_evidence_on(bundle: Bundle, *names: str) -> Bundle:
