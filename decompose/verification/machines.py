@@ -127,7 +127,7 @@ class _Judging:
         """What a document says of the properties of a loop, by their names; of nothing else."""
         names, found = {f"property.{prop.name}" for prop in net.properties}, dict[str, ShownRecord]()
         for one in checked_document(self.examination, file, net, self.answers, self.timeout_ms):
-            if one.record.name in found or one.record.query or one.record.name not in names:
+            if one.record.name not in names:
                 raise NotShownError(f"'{file}' speaks of '{one.record.name}' as no bundle does", "evidence", file)
             found[one.record.name] = one
         return found

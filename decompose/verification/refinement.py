@@ -196,7 +196,7 @@ class _Records:
         """Read the document on a task or on the conceptual net, which may speak of nothing but what is known."""
         for one in checked_document(self.examination, file, net, self.answers, self.timeout_ms):
             key = (task, one.record.name)
-            if one.record.name not in known or key in self.status or one.record.query:
+            if one.record.name not in known:
                 raise NotShownError(f"'{file}' speaks of '{one.record.name}', as no bundle does", "evidence", file)
             self.status[key] = Status.PROVED if one.record.proved else Status.VIOLATED
             self.methods[key] = "; ".join(one.methods) or "the net itself"

@@ -240,6 +240,58 @@ def test_gates_of_a_part_that_awaits_two_completions_are_asked_as_the_prover_ask
     assert not refused(bundle)
 
 
+GATED = """\
+firable: 1
+cell: joining
+controllers:
+  sys: {coordinator: true, start: u, places: {s: , u: , v: , w: }}
+  r:
+    start: [free, ready]
+    inputs: [entry, here, there]
+    places:
+      free:
+      ready:
+      busy:
+      brings: {send: {machine: A, command: BRING}, until: brought, within: 5s}
+      brings_fault: {send: {machine: A, command: STOP}}
+      opens:  {send: {machine: B, command: OPEN},  until: opened}
+      takes:  {send: {machine: A, command: TAKE},  until: taken}
+transitions:
+  begin: {from: [r.free, sys.u], to: [r.brings, r.opens, sys.s], if: [r.entry, r.ready], unless: r.busy}
+  join: {from: [r.brings, r.opens, sys.s], to: [r.takes, sys.v], if: r.here, unless: r.there}
+  again: {from: [r.brings_fault, r.opens, sys.s], to: [r.free, sys.u]}
+  look:
+    {from: [r.ready, sys.v], to: [r.busy, sys.w], if: [r.here, r.takes, r.taken], unless: [r.opened, r.brings_overdue]}
+  turn: {from: [r.busy, sys.w], to: [r.ready, sys.v]}
+  end: {from: [r.takes, sys.v], to: [r.free, sys.u]}
+"""
+
+
+def test_gates_that_want_no_completion_and_no_timer_are_asked_as_the_prover_asks_them() -> None:
+    """The documents are on the very questions; that one of them is violated is told only after that."""
+    net, plant = parse_net(GATED), ITS_MACHINES.replace("  B: {", "      STOP:  {does: stop}\n  B: {")
+    verdicts, files, _ = sealed_loops(split(net), plant, Limits)
+    asked = [(one.name, one.status) for one in verdicts if one.name.startswith("o4.")]
+    assert [name for name, _ in asked] == [
+        *("o4.begin/r.entry", "o4.join/r.here", "o4.join/r.there", "o4.look/r.here"),
+        *("o4.look/r.opened", "o4.look/r.brings_overdue", "o4.completions", "o4.commands"),
+    ]
+    assert asked[0][1] is Status.VIOLATED, "of the bundle this would be the second thing that is wrong"
+    with pytest.raises(NotShownError, match=r"the verdict on 'o4\.begin/r\.entry' is not what its proof shows"):
+        check_machines(Examination(Bundle(split(net), verdicts, files)), Cut(net), answered, TIMEOUT_MS)
+
+
+@pytest.mark.usefixtures("remembering", "unchanged")
+def test_a_document_that_says_something_of_the_loop_that_is_not_asked_is_refused() -> None:
+    bundle = make_bundle(check(parse_net(JOINING)), plant=ITS_MACHINES)
+    document = document_from_text(bundle.evidence[LOOP])
+    for name in ("deadlock-free", "property.loop.more", ""):
+        more = replace(document, records=(*document.records, Record(name, True, (), "no time")))
+        examination = Examination(replace(bundle, evidence={**bundle.evidence, LOOP: more.to_text()}))
+        with pytest.raises(NotShownError, match=f"'loop.evidence.json' speaks of '{name}' as no bundle does"):
+            check_machines(examination, Cut(bundle.net), answered, TIMEOUT_MS)
+
+
 @pytest.mark.usefixtures("remembering", "unchanged")
 @pytest.mark.parametrize(
     ("file", "record", "verdict"),
