@@ -15,7 +15,9 @@ from support.second_solver import by_cvc5
 
 from firable.analysis.induction.smt import Answer, Decision, Operator, Terms, value
 from firable.decompose.proofs.arbitration import Competition, Steps, arbitration, choice
+from firable.decompose.proofs.discharging import static
 from firable.decompose.proofs.family import Task
+from firable.decompose.proofs.obligation import Obligation, claimed
 from firable.decompose.proofs.proving import ProofReport, prove
 from firable.decompose.proofs.script import Reader, ScriptError, block
 from firable.decompose.proofs.standing import ASSUMED_BY_THE_PROTOCOL
@@ -466,3 +468,26 @@ def test_arbiter_over_many_is_proved_at_a_size_linear_in_its_arcs(by: Arbitratio
         assert report.holds
         sizes.append(len(report.files["arbitration.smt2"]))
     assert sizes[1] < 2.2 * sizes[0]
+
+
+def test_an_obligation_is_open_where_what_it_rests_on_is_and_refuted_whatever_that_is() -> None:
+    terms = Terms()
+    p, q = terms.variable("p"), terms.variable("q")
+    so = terms.equal(p, p)
+
+    def obligations(_: object) -> Iterator[Obligation]:
+        yield claimed(terms, "first", "p holds", p)
+        yield replace(claimed(terms, "second", "q holds", q), rests_on=("first",))
+        yield replace(claimed(terms, "third", "p is p", so), rests_on=("first",))
+        yield claimed(terms, "fourth", "p is p", so)
+        yield replace(claimed(terms, "fifth", "p is p", so), rests_on=("fourth", "third"))
+        yield replace(claimed(terms, "sixth", "p is p", so), rests_on=("fourth",))
+
+    found = static("some", "it is so", obligations)(Task(split(catalogue_net("one_robot")), 10_000))
+    violated, open_, proved = Status.VIOLATED, Status.UNKNOWN, Status.PROVED
+    assert [v.status for v in found.verdicts] == [violated, violated, open_, proved, open_, proved]
+    assert [v.bound for v in found.verdicts if v.bound] == [
+        "it rests on 'first', which is not proved",
+        "it rests on 'third', which is not proved",
+    ]
+    assert found.files["some.smt2"].count("(check-sat)") == len(found.verdicts)
