@@ -350,6 +350,21 @@ def test_no_model_in_time_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_what_z3_does_not_answer_is_no_proof() -> None:
     with pytest.raises(ScriptError):
         Reader(1000).answer('(echo "a")\n(echo "unsat")\n(assert false)\n(check-sat)\n')
+    with pytest.raises(ScriptError):
+        Reader(1000).answer('(echo "a")\n(echo "b")\n')
+    with pytest.raises(ScriptError):
+        Reader(1000, "(set-logic QF_UF)\n(assert false)\n(check-sat)\n").answer(block("a", "so", ()))
+
+
+def test_a_part_in_the_table_that_its_controller_does_not_have_refutes_what_is_read() -> None:
+    whole = split(catalogue_net("one_robot"))
+    row = next(row for row in whole.coordinated if row.name == "G3")
+    other = next(c.name for c in whole.net.controllers if c.name not in {part.controller for part in row.parts})
+    rows = (replace(r, parts=(*r.parts, Part(other, "t9-39"))) if r is row else r for r in whole.coordinated)
+    (found,) = (one for one in prove(replace(whole, coordinated=tuple(rows))).verdicts if one.name == "o3.G3")
+    assert found.status is Status.VIOLATED
+    assert found.witness is not None
+    assert (f"{other} has no t9-39", True) in found.witness.assignment
 
 
 @pytest.mark.parametrize("ended", [z3.Z3Exception('(error "line 6 column 7: push canceled")\nb\nunsat'), "b\nunsat"])

@@ -32,6 +32,7 @@ from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net, family_net
 from firable.nets.diagnostics import InputError
 from firable.nets.net import Controller, Net, Place, Transition
+from firable.nets.text import parse_net
 from firable.nets.verdict import NOTHING, TOKENS_MAX, Status, Verdict
 
 CELLS = ("conceptual_one_robot", "one_robot", "two_robots_shared")
@@ -102,6 +103,33 @@ def test_names_in_any_script_are_stated_anew() -> None:
     examination = Examination(Bundle(decomposition, proof.verdicts, proof.files))
     for family in HEADS:
         compared(examination, check_cut(decomposition), family)
+
+
+GATES = """\
+firable: 1
+cell: gates
+controllers:
+  a: {coordinator: true, start: [p, lit], places: {p: , q: , lit: , dark: }}
+  b: {start: r, inputs: [go, stop], places: {r: , s: }}
+transitions:
+  there: {from: a.p, to: a.q, if: [b.r, a.lit], unless: [b.s, a.dark]}
+  back: {from: a.q, to: a.p, if: [b.s, b.go], unless: [b.r, b.stop]}
+  down: {from: b.r, to: b.s, if: a.q}
+  up: {from: b.s, to: b.r, unless: a.q}
+  out: {from: a.lit, to: a.dark, if: b.s}
+  in: {from: a.dark, to: a.lit, if: b.go}
+"""
+
+
+def test_gates_of_every_kind_are_stated_anew() -> None:
+    """No net of the catalogue has a permissive one."""
+    decomposition = split(parse_net(GATES))
+    proof = prove(decomposition)
+    assert proof.holds
+    examination = Examination(Bundle(decomposition, proof.verdicts, proof.files))
+    cut = check_cut(decomposition)
+    for family in HEADS:
+        compared(examination, cut, family)
 
 
 def test_the_families_stated_anew_are_those_of_the_prover() -> None:
