@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Collection, Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -77,7 +77,9 @@ def opened(
             _demand_the_cell(cell, net, kept)
         is_taken_over = begun and kept is None
         if isinstance(trace, Path | str):
-            if begun and not is_taken_over:
+            if is_taken_over:
+                _demand_an_empty_one(trace)
+            elif begun:
                 _demand_the_same(trace, kept)
             trace = stack.enter_context(closing(TraceFile(trace, size_bytes_of(kept))))
         now = time.time() if machines else 0.0
@@ -98,6 +100,17 @@ def _demand_the_same(path: Path | str, kept: Stored | None) -> None:
         message = f"{printable(str(path))}: this run was begun without a trace, which cannot be begun in the middle"
         hint = "leave --trace out, or begin with a new journal"
     raise InputError([Diagnostic("F1017", message, hint)])
+
+
+def _demand_an_empty_one(path: Path | str) -> None:
+    """A takeover begins another trace; the one until then, of the same machines, is written over by no start script."""
+    with suppress(OSError, ValueError):  # what cannot be looked at, `TraceFile` refuses
+        if Path(path).is_file() and Path(path).stat().st_size:
+            message = (
+                f"{printable(str(path))}: the trace of a run that was taken over begins anew, and this file has lines"
+            )
+            hint = "name another file; `firable replay` judges each with the bundle of its time"
+            raise InputError([Diagnostic("F1017", message, hint)])
 
 
 def _lines_of(kept: Stored | None) -> str:

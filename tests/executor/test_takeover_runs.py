@@ -98,6 +98,25 @@ def test_the_trace_of_a_run_that_has_taken_a_cell_over_begins_there_and_is_judge
     assert main(["draw", str(new), "--what", "strip", "--trace", str(trace), "-o", str(tmp_path / "s.svg")]) == 0
 
 
+def test_the_trace_of_the_time_before_a_takeover_is_not_written_over(
+    bundles: tuple[Path, Path], tmp_path: Path
+) -> None:
+    old, new = bundles
+    before = journal(tmp_path / "old.journal", old, {"robot.free", "table.empty"})
+    after, trace = tmp_path / "new.journal", tmp_path / "cell.trace"
+    trace.write_text("what happened until then\n")
+    assert main(["takeover", str(old), str(new), "--journal", str(before), "--into", str(after)]) == 0
+    read = read_bundle(new)
+    with pytest.raises(InputError, match="begins anew, and this file has lines"):
+        opened(read.decomposition, read.digest, after, trace).__enter__()
+    assert trace.read_text() == "what happened until then\n"
+    for free in (tmp_path / "missing.trace", tmp_path / "empty.trace"):
+        if free.name.startswith("empty"):
+            free.touch()
+        with opened(read.decomposition, read.digest, after, free):
+            pass
+
+
 def test_the_traces_of_hosts_that_were_taken_over_join_and_not_with_one_that_was_not(tmp_path: Path) -> None:
     async def main() -> None:
         cell = Cell(tmp_path)
