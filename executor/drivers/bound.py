@@ -110,6 +110,11 @@ class BoundDriver:
         of_each = ((one.unreached,) if one.unreached else (one.unshown, one.untaken) for one in self.devices.values())
         return tuple(phrase for phrases in of_each for phrase in phrases if phrase)
 
+    @property
+    def tells_each_sensor(self) -> bool:
+        """Always: each when it was read first, or when its loss policy has given it a value."""
+        return True
+
     def readings(self) -> Mapping[str, Reading]:
         """The process image."""
         return {name: reading for device in self.devices.values() for name, reading in device.image.readings.items()}

@@ -326,8 +326,14 @@ class BoundDevice:
         return [name for name in sorted(signals) if self.image.readings[name].quality is Quality.GOOD]
 
     def _should_have_shown(self) -> None:
-        """Tell what was never shown: where a device tells unasked, a point that is written wrong is not noticed."""
+        """Tell what was never shown: where a device tells unasked, a point that is written wrong is not noticed.
+
+        A loss policy that gives a value holds from now on; the gates of the others stay closed until they are shown.
+        """
         self.is_overdue = True
+        silent = [name for name, reading in self.image.readings.items() if reading.value is None]
+        given = [name for name in silent if self.image.signals[name].on_loss in {"0", "1"}]
+        self._tell(*self.image.lost("never shown", given))
         if self.unshown:
             self.note(f"{self.unshown.removeprefix(self.name + ' ')}: {_POINTS}")
 

@@ -7,7 +7,7 @@ to a listener without waiting, and is told of each command that a place sends. W
   sees the outcome, the sensor shows it; sending the next command that it completes clears it. What was acknowledged is
   named by place and entry number, so that the answer to an earlier command is never taken for that to the present one.
 - A signal whose device is lost follows its *loss policy*: hold the value (quality uncertain), take a safe value, or be
-  a fault (quality bad both times). Nothing is told of a signal that has not been read yet.
+  a fault (quality bad both times). Nothing is told of a signal that has not been read yet, and no gate of it is open.
 - The *safe outputs* are driven at start-up, before any command; at `stop`; and when this process crashes or freezes,
   by the device itself: the driver gives it a heartbeat, and the device's own watchdog does the rest.
 - A connection that failed or timed out is never used again: the answer that comes too late would be taken for that to
@@ -173,6 +173,20 @@ class Cautious(Protocol):
 
     async def let_drive(self) -> None:
         """Wait until they may be driven."""
+        ...
+
+
+@runtime_checkable
+class Telling(Protocol):
+    """A driver that tells each sensor when it was read first, one that shows 0, too; before that nobody knows it.
+
+    So the gates of a sensor are closed until then: a transition `unless` somebody is there would fire, and a machine
+    move, before anybody has looked.
+    """
+
+    @property
+    def tells_each_sensor(self) -> bool:
+        """Whether it does."""
         ...
 
 

@@ -25,7 +25,7 @@ import asyncio
 from collections.abc import Awaitable, Callable, Collection, Sequence
 from typing import TYPE_CHECKING, Final
 
-from firable.executor.drivers.driver import Driver, Latched
+from firable.executor.drivers.driver import Driver, Latched, Telling
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.links.link import Link
 from firable.executor.links.standing import Standing
@@ -145,6 +145,9 @@ class Host:
             self.coalesced.behind_promises,
         )
         self.coordinators, self.controllers = self.acts.coordinators, self.acts.controllers
+        if isinstance(self.driver, Telling) and self.driver.tells_each_sensor:
+            for controller in self.controllers.values():
+                controller.await_sensors()
         at_once, go_on = self.groups.at_once, self._go_on
         known, link = self.acquaintances, self.link
         self.peers = Peers(self.decomposition, self.acts, known, link, self.told, at_once, go_on, self.broken)

@@ -314,6 +314,10 @@ class LocalController:
         self._mark_unsent()
         held = self._locked_reads()
         self.word &= ~sum(bit for name in self.timers.signals if not (bit := self.player.signal_bit(name)) & held)
+        self.await_sensors()
+
+    def await_sensors(self) -> None:
+        """Close the gates of each sensor until it is told: what nobody has read yet is no 0."""
         sensors = (s.name for s in self.subnet.signals if s.kind is SignalKind.SENSOR)
         self.untold = sum(map(self.player.signal_bit, sensors))
 
@@ -439,7 +443,7 @@ class LocalController:
     def _is_enabled(self, transition: Compiled) -> bool:
         """Enabled by the image, and by what the signals show where a promise keeps that out of the image.
 
-        A sensor untold since the restart closes its gates; a token whose command is not sent yet is not taken.
+        A sensor untold since the start closes its gates; a token whose command is not sent yet is not taken.
         """
         if transition.takes & self.unsent or transition.reads & self.untold:
             return False
