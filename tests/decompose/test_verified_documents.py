@@ -9,6 +9,7 @@ from support.remembered import answered, bundled, examined, rests_on_an_obligati
 
 from firable.analysis.check import check
 from firable.analysis.evidence.certificate import (
+    Certificate,
     Continuation,
     FiringSequence,
     InductiveInvariant,
@@ -181,7 +182,16 @@ def test_whether_a_set_is_closed_is_asked_again_of_each_set_and_of_each_begin_of
     (first, second), begin = (Markings((1, 2)), Markings((1, 2))), (("t1",),)
     whole, part, run = Labelling(first), Continuation(begin, Labelling(first)), FiringSequence(begin)
     invariant = InductiveInvariant()
-    shown = [whole, whole, Labelling(second), part, part, Continuation((), Labelling(first)), run, run]
+    shown: list[Certificate] = [
+        whole,
+        whole,
+        Labelling(second),
+        part,
+        part,
+        Continuation((), Labelling(first)),
+        run,
+        run,
+    ]
     shown += [Continuation(begin, invariant)] * 2
     claim, asked = Claim(ClaimKind.NEVER, Deadlock()), list[bool]()
     records = tuple(Record("", True, ((claim, one),)) for one in shown)
