@@ -63,8 +63,7 @@ class Technique(Generic[F]):
 
     def load(self) -> F:
         """The function itself."""
-        module, _, name = self.at.partition(":")
-        function: F = getattr(import_module(module), name)
+        function: F = _named(self.at)
         return function
 
 
@@ -74,8 +73,12 @@ class Anew(Technique["Knower"]):
 
     def load(self) -> Knower:
         """What makes of a net what is asked with limits."""
-        module, _, name = self.at.partition(":")
-        return partial(partial, getattr(import_module(module), name))
+        return partial(partial, _named(self.at))
+
+
+def _named(at: str) -> Any:
+    module, _, name = at.partition(":")
+    return getattr(import_module(module), name)
 
 
 SPACES: Final[dict[Method, Technique[SpaceMaker]]] = {

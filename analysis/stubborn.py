@@ -259,8 +259,10 @@ class FiringSearch:
         self.until_dead = False
 
     def found(self, limits: Limits, *, until_dead: bool = False) -> Firings:
-        """What was found by the end of these limits, or with `until_dead` as soon as a transition is known to be dead,
-        when others may be so that are still open."""
+        """What was found by the end of these limits.
+
+        With `until_dead` that is over as soon as a transition is known to be dead; others may be so that are open then.
+        """
         self.runs.limits = self.projections.limits = limits
         self.until_dead = until_dead
         bound = ""

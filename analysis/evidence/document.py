@@ -19,10 +19,9 @@ the document and seals it anew has either made another proof, or none.
 
 A verdict that nothing shows stands there too, and why: what is only claimed is to be seen. A document larger than a
 mebibyte is compressed (gzip); it is read like any other, but only as far as a hundred times its file, so that who reads
-a small file needs little memory. Rejected: a file for each verdict, which repeats net and
-markings a hundred times; to name the net by its digest only, which makes evidence worthless where the file of the net
-is lost; and to keep the obligations instead of the data they come from, which would let a forger choose what is to be
-proved.
+a small file needs little memory. Rejected: a file for each verdict, which repeats net and markings a hundred times; to
+name the net by its digest only, which makes evidence worthless where the file of the net is lost; and to keep the
+obligations instead of the data they come from, which would let a forger choose what is to be proved.
 """
 
 from __future__ import annotations

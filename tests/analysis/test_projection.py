@@ -257,7 +257,9 @@ def test_transitions_are_found_dead_and_firing_by_projections_alone(monkeypatch:
     net = replace(net, transitions=(*net.transitions, *dead))
     monkeypatch.setattr(stubborn.FiringSearch, "_walk", lambda *_: None)
     monkeypatch.setattr(stubborn.FiringSearch, "_round", lambda *_, **__: "")
-    found = find_firings(net, Limits())
+    search = stubborn.FiringSearch(net)
+    found = search.found(Limits())
+    assert not search.projections._explored, "what is only kept for another time takes no memory"
     assert (found.dead, found.undecided) == (("both", "read", "loop"), ())
     for transition in net.transitions[: -len(dead)]:
         assert found.witness(transition.name) is not None

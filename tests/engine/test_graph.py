@@ -1,4 +1,4 @@
-"""What is asked of a graph, against the definitions: what leads where, components, fair runs, and networkx."""
+"""What is asked of a graph, against the definitions: what leads where, what is kept for it, and fair runs."""
 
 from __future__ import annotations
 
