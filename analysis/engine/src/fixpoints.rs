@@ -187,6 +187,7 @@ impl<'a> Search<'a> {
     }
 
     /// A marking has an edge to one that was reached.
+    #[inline(always)]
     fn meet(&mut self, source: u32) {
         let source = source as usize;
         if !self.reach.has(source) && self.within.is_none_or(|within| within[source] != 0) {
