@@ -625,11 +625,11 @@ class Stubborn:
         transitions: list[int],
         *,
         seed: int,
-        max_steps: int,
+        max_vain: int,
         max_seconds: float | None,
         cancelled: Callable[[], bool] | None = None,
     ) -> tuple[list[tuple[tuple[int, int] | None, list[int], list[tuple[int, int]]]], list[int] | None, int]:
-        """Walk at random until each of some transitions was firable, for `max_steps` firings or the time at most.
+        """Walk at random until each was firable, `max_vain` firings in a row met none anew, or the time is over.
 
         The ways to them: each goes on from an earlier one, after so many of its firings (None: from M0), and tells what
         it fires, and which of the transitions are firable after how many of these firings. Also a firing sequence from

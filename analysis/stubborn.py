@@ -311,11 +311,12 @@ class FiringSearch:
     def _walk(self, turn: int) -> None:
         """Make open transitions fire by random walks.
 
-        Each turn walks anew, and towards all transitions, because those that are easily met lead to the others.
+        Each turn walks anew, and towards all transitions, because those that are easily met lead to the others; it ends
+        when so many firings in a row have met none: no other stage meets as many.
         """
         everything, firings = range(len(self.runs.net.transitions)), _WALKED[min(turn, 1)] * 4 ** max(0, turn - 1)
         limits = engine_limits(self.runs.limits.deadline)
-        found, deadlock, steps = self.runs.engine.cover(list(everything), seed=SEED + turn, max_steps=firings, **limits)
+        found, deadlock, steps = self.runs.engine.cover(list(everything), seed=SEED + turn, max_vain=firings, **limits)
         self.runs.edges += steps
         needed = set[int]()
         for way, (after, _, firable) in reversed(list(enumerate(found))):

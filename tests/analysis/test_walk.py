@@ -83,7 +83,7 @@ def test_what_walks_meet_fires_after_the_ways_that_they_tell(chunk: int) -> None
     for seed in range(40 * chunk, 40 * (chunk + 1)):
         net = lively_net(random.Random(seed), 9)
         every = range(len(net.transitions))
-        ways, deadlock, steps = Stubborn(*rows(net)).cover(list(every), seed=seed, max_steps=3000, max_seconds=None)
+        ways, deadlock, steps = Stubborn(*rows(net)).cover(list(every), seed=seed, max_vain=3000, max_seconds=None)
         player, reached, met = Player(net), dict[tuple[int, int], int](), list[int]()
         for number, (after, firings, firable) in enumerate(ways):
             marking = net.initial_marking if after is None else reached[after]
@@ -107,6 +107,6 @@ def test_what_walks_meet_fires_after_the_ways_that_they_tell(chunk: int) -> None
 
 def test_walks_in_a_net_that_is_stuck_at_once_end() -> None:
     net = net_of("p", "t: q -> p")
-    assert Stubborn(*rows(net)).cover([0], seed=1, max_steps=10**9, max_seconds=None) == ([], [], 0)
+    assert Stubborn(*rows(net)).cover([0], seed=1, max_vain=10**9, max_seconds=None) == ([], [], 0)
     with pytest.raises(IndexError):
-        Stubborn(*rows(net)).cover([1], seed=1, max_steps=1, max_seconds=None)
+        Stubborn(*rows(net)).cover([1], seed=1, max_vain=1, max_seconds=None)

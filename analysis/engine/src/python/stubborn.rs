@@ -163,13 +163,13 @@ impl Stubborn {
         Ok((found.unwrap_or(None), steps))
     }
 
-    #[pyo3(signature = (transitions, *, seed, max_steps, max_seconds, cancelled=None))]
+    #[pyo3(signature = (transitions, *, seed, max_vain, max_seconds, cancelled=None))]
     fn cover(
         &self,
         py: Python<'_>,
         transitions: Vec<u32>,
         seed: u64,
-        max_steps: u64,
+        max_vain: u64,
         max_seconds: Option<f64>,
         cancelled: Option<Py<PyAny>>,
     ) -> PyResult<(Ways, Option<Vec<u32>>, u64)> {
@@ -179,7 +179,7 @@ impl Stubborn {
         let mut raised = None;
         let Prepared { net, dependencies } = &*self.prepared;
         let (found, _) = detached(py, &patience, &mut raised, |poll| {
-            cover::cover(net, dependencies, &transitions, seed, max_steps, &mut Watch::new(deadline, poll))
+            cover::cover(net, dependencies, &transitions, seed, max_vain, &mut Watch::new(deadline, poll))
         });
         but_ctrl_c(py, raised)?;
         let ways = found.ways.into_iter().map(|way| (way.from, way.firings, way.firable)).collect();

@@ -4,7 +4,8 @@
 //! kept, cut down to the firings that it needs, and later walks start from there as often as from M0 (the archive of
 //! Ecoffet and others, "First return, then explore", 2021). A third of the walks are drawn towards one open transition
 //! by relaxed plans; a third fire what was fired least; a third are blind. Plans are strict, with as many tokens at rest as
-//! can be (`Plan::freeze`), as long as making them takes no longer than walking. A deadlock that is met on the way is kept.
+//! can be (`Plan::freeze`) and all towards one transition until it is met, as long as making them takes no longer than
+//! walking. A deadlock that is met on the way is kept.
 //!
 //! What comes out is a tree of firing sequences, each of which goes on from a moment of another: what a walk has met is
 //! shown by one sequence, cut down to what all of it needs, so that all together are replayed in the time that their
@@ -51,17 +52,17 @@ struct Start {
     visits: u32,
 }
 
-/// Walks from M0 until each of the `open` transitions was firable, or for `max_steps` firings.
+/// Walks from M0 until each of the `open` transitions was firable, or `max_vain` firings in a row met none of them anew.
 pub fn cover(
     net: &Net,
     dependencies: &Dependencies,
     open: &[u32],
     seed: u64,
-    max_steps: u64,
+    max_vain: u64,
     watch: &mut Watch<'_>,
 ) -> (Cover, Result<(), Stop>) {
     let mut search = Search::new(net, dependencies, open, seed);
-    let end = search.run(max_steps, watch);
+    let end = search.run(max_vain, watch);
     (search.found, end)
 }
 
@@ -74,12 +75,16 @@ struct Search<'a> {
     fired: Vec<u32>,
     archive: Vec<Start>,
     plan: Plan<'a>,
+    /// The open transition that a strict walk goes towards.
+    aimed: u32,
     random: Random,
     /// Whether no firing in M0 leads to another marking.
     nowhere_to_go: bool,
     /// The work of walking, and of planning strictly.
     walked: usize,
     planned: usize,
+    /// How many firings had been made when an open transition was met last.
+    met_at: u64,
     found: Cover,
 }
 
@@ -100,10 +105,12 @@ impl<'a> Search<'a> {
             fired: vec![0; count],
             archive: vec![Start { marking: net.initial.clone(), at: None, visits: 0 }],
             plan: Plan::new(dependencies, net.places, count),
+            aimed: CLOSED,
             random: Random::new(seed),
             nowhere_to_go: false,
             walked: 0,
             planned: 0,
+            met_at: 0,
             found: Cover::default(),
         };
         for &t in open.iter().filter(|&&t| dependencies.able(t)) {
@@ -123,17 +130,17 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn run(&mut self, max_steps: u64, watch: &mut Watch<'_>) -> Result<(), Stop> {
+    fn run(&mut self, max_vain: u64, watch: &mut Watch<'_>) -> Result<(), Stop> {
         let unit = UNIT.max(self.net.transitions.len().min(LENGTH_MAX / 64));
         for round in 1_u64.. {
-            if self.open.is_empty() || self.nowhere_to_go || self.found.steps >= max_steps {
+            let left = self.met_at.saturating_add(max_vain).saturating_sub(self.found.steps);
+            if self.open.is_empty() || self.nowhere_to_go || left == 0 {
                 break;
             }
             let from = self.start(round);
             self.archive[from].visits += 1;
             let length = LENGTH_MAX.min(unit.saturating_mul(luby(round.div_ceil(6)) as usize));
-            let left = usize::try_from(max_steps - self.found.steps).unwrap_or(usize::MAX);
-            self.walk(from, round % 3, length.min(left), watch)?;
+            self.walk(from, round, length.min(usize::try_from(left).unwrap_or(usize::MAX)), watch)?;
         }
         Ok(())
     }
@@ -148,13 +155,14 @@ impl<'a> Search<'a> {
     }
 
     /// One walk.
-    fn walk(&mut self, from: usize, kind: u64, length: usize, watch: &mut Watch<'_>) -> Result<(), Stop> {
+    fn walk(&mut self, from: usize, round: u64, length: usize, watch: &mut Watch<'_>) -> Result<(), Stop> {
         let count = self.net.transitions.len();
         let mut walker = Walker::new(self.dependencies, &self.archive[from].marking, count);
         watch.tick(count)?;
         let (mut path, mut met) = (Vec::new(), Vec::new());
         self.meet(&walker, &walker.firable, 0, &mut met);
         self.plan.forget();
+        self.aimed = CLOSED;
         let strict = self.planned <= PLANNING * self.walked;
         while path.len() < length && !self.open.is_empty() {
             if walker.stuck() {
@@ -168,10 +176,10 @@ impl<'a> Search<'a> {
                 break;
             }
             let mut work = 0;
-            let t = match kind {
+            let t = match round % 3 {
                 0 => self.least_fired(&walker),
                 1 => {
-                    if !self.plan.is_fresh() {
+                    if !self.plan.is_fresh(&walker) {
                         let (is_planned, more) = self.aim(&walker, strict, path.is_empty());
                         if !is_planned {
                             watch.tick(more)?;
@@ -199,13 +207,16 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Plans a way to an open transition that is drawn, in a strict walk with as many tokens at rest as could be at its
-    /// beginning; whether there is one, and the work.
+    /// Plans a way to an open transition that is drawn, in a strict walk to the same one until it is met, with as many tokens
+    /// at rest as could be at its beginning; whether there is one, and the work.
     fn aim(&mut self, walker: &Walker<'_>, strict: bool, is_first: bool) -> (bool, usize) {
         let mut work = 0;
         for _ in 0..if strict { TRIES } else { 1 } {
-            let target = self.open[self.random.below(self.open.len())];
-            let goal = self.dependencies.conditions(target);
+            let is_on_its_way = strict && self.aimed != CLOSED && self.position[self.aimed as usize] != CLOSED;
+            if !is_on_its_way {
+                self.aimed = self.open[self.random.below(self.open.len())];
+            }
+            let goal = self.dependencies.conditions(self.aimed);
             let (is_planned, more) = if strict && is_first {
                 self.plan.freeze(&walker.marking, goal, &mut self.random)
             } else {
@@ -216,6 +227,7 @@ impl<'a> Search<'a> {
             if is_planned {
                 return (true, work);
             }
+            self.aimed = CLOSED;
         }
         (false, work)
     }
@@ -237,6 +249,7 @@ impl<'a> Search<'a> {
         for &t in among {
             if self.position[t as usize] != CLOSED && walker.may_fire(t) {
                 self.close(t);
+                self.met_at = self.found.steps;
                 met.push((t, after));
             }
         }
@@ -333,6 +346,20 @@ mod tests {
             }
         }
         assert_eq!(found.deadlock.map(|path| path.len()), Some(200));
+    }
+
+    #[test]
+    fn walks_end_after_so_many_firings_that_met_nothing_anew() {
+        let arc = |from, to| Transition::new(&[from], &[to], &[], &[], &[]);
+        let mut transitions: Vec<Transition> = (0..200).map(|p| arc(p, p + 1)).collect();
+        transitions.push(arc(201, 0));
+        let net = Net::new(202, transitions, &[0]).expect("well formed");
+        let (mut poll, dependencies) = (unwatched, Dependencies::new(&net));
+        let all: Vec<u32> = (0..201).collect();
+        let (found, end) = cover(&net, &dependencies, &all, 1, 150, &mut Watch::new(None, &mut poll));
+        let met: usize = found.ways.iter().map(|way| way.firable.len()).sum();
+        assert_eq!((end, met), (Ok(()), 200));
+        assert!((350..=2_000).contains(&found.steps), "{}", found.steps);
     }
 
     #[test]

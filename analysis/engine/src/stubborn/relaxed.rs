@@ -19,6 +19,8 @@ use crate::random::Random;
 
 /// Firings along one relaxed plan before the next is made.
 const PLAN_STEPS: usize = 64;
+/// How many transitions are drawn before one is fired that moves what is to stay.
+const DRAWS: usize = 8;
 const NEVER: u32 = u32::MAX;
 
 /// Room for plans in one net.
@@ -86,6 +88,19 @@ impl<'a> Relaxed<'a> {
         }
     }
 
+    /// The literals of a formula that are the fewest layers away from a marking; false where there is no plan to any.
+    fn nearest(
+        &mut self,
+        formula: &mut Formula,
+        marking: &[u64],
+        random: &mut Random,
+        goal: &mut Vec<Literal>,
+    ) -> bool {
+        goal.clear();
+        self.spread(marking, random);
+        formula.cheapest(|l| u64::from(self.layer[l as usize]), random, goal)
+    }
+
     /// The transitions of a plan from a marking to one that satisfies a formula; false where there is none.
     pub(super) fn plan_to(
         &mut self,
@@ -94,10 +109,9 @@ impl<'a> Relaxed<'a> {
         random: &mut Random,
         into: &mut Vec<u32>,
     ) -> bool {
-        self.spread(marking, random);
         let mut goal = Vec::new();
-        let reached = formula.cheapest(|l| u64::from(self.layer[l as usize]), random, &mut goal);
-        self.extract(if reached { &goal } else { &[] }, into);
+        let reached = self.nearest(formula, marking, random, &mut goal);
+        self.extract(&goal, into);
         reached
     }
 
@@ -179,13 +193,24 @@ pub(super) struct Plan<'a> {
     relaxed: Relaxed<'a>,
     left: Vec<u32>,
     steps: usize,
-    /// Whether some tokens stay where they are, and nothing is fired beside the plan.
+    /// What the target was replaced by for this walk, in a strict one.
+    goal: Vec<Literal>,
+    /// Whether some tokens stay where they are.
     strict: bool,
+    /// Whether now and then something is fired that is not of the plan.
+    stray: bool,
 }
 
 impl<'a> Plan<'a> {
     pub(super) fn new(net: &'a Dependencies, places: usize, transitions: usize) -> Self {
-        Plan { relaxed: Relaxed::new(net, places, transitions), left: Vec::new(), steps: 0, strict: false }
+        Plan {
+            relaxed: Relaxed::new(net, places, transitions),
+            left: Vec::new(),
+            steps: 0,
+            goal: Vec::new(),
+            strict: false,
+            stray: true,
+        }
     }
 
     /// Lets go of the plan; the next may have all transitions.
@@ -193,6 +218,7 @@ impl<'a> Plan<'a> {
         self.left.clear();
         self.relaxed.still.clear();
         self.strict = false;
+        self.stray = true;
     }
 
     /// Lets go of the plan, and makes one to some literals that moves as few tokens of a marking as can be; the next leave
@@ -204,6 +230,7 @@ impl<'a> Plan<'a> {
     pub(super) fn freeze(&mut self, marking: &[u64], goal: &[Literal], random: &mut Random) -> (bool, usize) {
         self.forget();
         self.strict = true;
+        self.stray = random.below(2) == 0;
         self.steps = PLAN_STEPS;
         let places = self.relaxed.layer.len() as u32 / 2;
         let mut tokens: Vec<u32> = (0..places).filter(|&p| is_true(literal(p, true), marking)).collect();
@@ -234,9 +261,9 @@ impl<'a> Plan<'a> {
         (true, plans * self.size())
     }
 
-    /// Whether there is something left to do for the plan.
-    pub(super) fn is_fresh(&self) -> bool {
-        self.steps > 0 && !self.left.is_empty()
+    /// Whether there is something left to do for the plan; of a strict one, now.
+    pub(super) fn is_fresh(&self, walker: &Walker<'_>) -> bool {
+        self.steps > 0 && self.left.iter().any(|&t| !self.strict || walker.may_fire(t))
     }
 
     /// Makes a plan from where a walk stands to some literals; false where there is none.
@@ -253,33 +280,53 @@ impl<'a> Plan<'a> {
     /// A transition of the plan that is firable, which is taken out of it; now and then, and where there is none, any.
     pub(super) fn follow(&mut self, walker: &Walker<'_>, random: &mut Random) -> u32 {
         self.steps = self.steps.saturating_sub(1);
-        if (self.strict || random.below(16) > 0) && !self.left.is_empty() {
+        if (!self.stray || random.below(16) > 0) && !self.left.is_empty() {
             let (begin, count) = (random.below(self.left.len()), self.left.len());
             let firable = (begin..begin + count).map(|k| k % count).find(|&at| walker.may_fire(self.left[at]));
             if let Some(at) = firable {
                 return self.left.swap_remove(at);
             }
-            if self.strict {
-                self.left.clear();
+        }
+        for _ in 0..DRAWS {
+            let t = walker.firable[random.below(walker.firable.len())];
+            if !self.relaxed.still.has(t) {
+                return t;
             }
         }
         walker.firable[random.below(walker.firable.len())]
     }
 
-    /// The next transition of a plan to the target, and the work of finding it.
-    pub(super) fn next(&mut self, walker: &Walker<'_>, target: &mut Target, random: &mut Random) -> (u32, usize) {
+    /// Begins a walk from a marking along strict plans to literals that make a formula true; the work of it.
+    pub(super) fn begin_strictly(&mut self, marking: &[u64], formula: &mut Formula, random: &mut Random) -> usize {
+        let mut goal = std::mem::take(&mut self.goal);
+        let is_near = self.relaxed.nearest(formula, marking, random, &mut goal);
+        let work = if is_near { self.freeze(marking, &goal, random).1 } else { 0 };
+        self.goal = goal;
+        self.size() + formula.size() + work
+    }
+
+    /// The next transition of a plan to the target, none where a strict one cannot go on, and the work of finding it.
+    pub(super) fn next(
+        &mut self,
+        walker: &Walker<'_>,
+        target: &mut Target,
+        random: &mut Random,
+    ) -> (Option<u32>, usize) {
         let mut work = 0;
-        if !self.is_fresh() {
+        if !self.is_fresh(walker) {
             self.steps = PLAN_STEPS;
             work = self.size() + target.size();
-            match target {
-                Target::Deadlock => _ = self.relaxed.plan_to_deadlock(&walker.marking, random, &mut self.left),
-                Target::Formula(formula) => {
-                    self.relaxed.plan_to(formula, &walker.marking, random, &mut self.left);
-                }
+            let (marking, left) = (&walker.marking, &mut self.left);
+            let is_planned = match target {
+                Target::Formula(_) if self.strict => self.relaxed.plan(marking, &self.goal, random, left),
+                Target::Formula(formula) => self.relaxed.plan_to(formula, marking, random, left),
+                Target::Deadlock => self.relaxed.plan_to_deadlock(marking, random, left),
+            };
+            if self.strict && !is_planned {
+                return (None, work);
             }
         }
-        (self.follow(walker, random), work)
+        (Some(self.follow(walker, random)), work)
     }
 }
 
@@ -312,6 +359,9 @@ mod tests {
             let (is_planned, work) = plan.freeze(&net.initial, &goal, &mut random);
             assert!(is_planned && (3 * plan.size()..=6 * plan.size()).contains(&work), "{work}");
             assert_eq!(made(&mut plan), [0, 1, 2, 3, 4, 5]);
+            // What is fired beside the plan moves nothing that is at rest, where there is something else.
+            let moves = (0..64).filter(|_| plan.follow(&walker, &mut random) == 6).count();
+            assert!(moves < 4, "{moves} of 64");
             // What was at rest stays so in the next plans, and of others there is none.
             assert!(plan.towards(&walker, &goal, &mut random));
             assert_eq!(made(&mut plan), [0, 1, 2, 3, 4, 5]);

@@ -5,10 +5,11 @@
 //! are false is counted, and only the needers of what was flipped are looked at, whatever the size of the net. Every
 //! fourth walk is blind; every fourth draws a few transitions and fires the one that was fired least; every fourth
 //! the one after which the goal is nearest (literals that still have to become true; firable transitions, for a
-//! deadlock); and every fourth follows relaxed plans, which see what has to happen long before. To fire what was fired
-//! least keeps a net going, so those that look for a deadlock are blind in its place. The lengths follow the
-//! sequence of Luby, Sinclair and Zuckerman ("Optimal speedup of Las Vegas algorithms", 1993), which is within a
-//! logarithm of the best choice of restarts, whatever that is.
+//! deadlock); and every fourth follows relaxed plans, which see what has to happen long before. Every other of these
+//! is strict, with as many tokens at rest as can be (`Plan::freeze`), where it goes to a formula and as long as planning
+//! so takes no longer than walking. To fire what was fired least keeps a net going, so those that look for a deadlock are
+//! blind in its place. The lengths follow the sequence of Luby, Sinclair and Zuckerman ("Optimal speedup of Las Vegas
+//! algorithms", 1993), which is within a logarithm of the best choice of restarts, whatever that is.
 //!
 //! What was found is cut down before it is shown: from the end backwards, a firing is kept if it makes a literal true
 //! that the goal or a kept firing later needs. What is kept can be fired without the rest, because a literal that is
@@ -82,6 +83,8 @@ fn find(
     let mut plan = Plan::new(dependencies, net.places, count);
     let evenly = if matches!(target, Target::Deadlock) { Guide::Blind } else { Guide::LeastFired };
     let guides = [evenly, Guide::Nearest, Guide::Blind, Guide::Planned];
+    // The work of walking, and of planning strictly.
+    let (mut walked, mut planned) = (0, 0);
     for round in 1_u64.. {
         let guide = guides[round as usize % guides.len()];
         let length = LENGTH_MAX.min(unit.saturating_mul(luby(round.div_ceil(4)) as usize));
@@ -89,6 +92,15 @@ fn find(
         watch.tick(count)?;
         path.clear();
         plan.forget();
+        if guide == Guide::Planned
+            && round / 4 % 2 == 0
+            && planned <= walked
+            && let Target::Formula(formula) = target
+        {
+            let work = plan.begin_strictly(&walker.marking, formula, &mut random);
+            planned += work;
+            watch.tick(work)?;
+        }
         for _ in 0..length {
             if target.met(&walker) {
                 let needed = cut_down(dependencies, target, &walker.marking, &path, count, net.places);
@@ -101,10 +113,17 @@ fn find(
                 return Ok(None);
             }
             let (t, work) = match guide {
-                Guide::Planned => plan.next(&walker, target, &mut random),
+                Guide::Planned => match plan.next(&walker, target, &mut random) {
+                    (Some(t), work) => (t, work),
+                    (None, work) => {
+                        watch.tick(work)?;
+                        break;
+                    }
+                },
                 _ => choose(&mut walker, target, guide, &fired, &mut random),
             };
             let work = work + walker.flip(t) + target.size();
+            walked += work;
             fired[t as usize] = fired[t as usize].saturating_add(1);
             path.push(t);
             *steps += 1;
@@ -223,6 +242,8 @@ pub(super) fn without_loops(net: &Net, path: &[u32]) -> Vec<u32> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::dependencies::literal;
+    use super::super::formula::{Formula, Node};
     use super::*;
     use crate::budget::unwatched;
     use crate::net::Transition;
@@ -231,6 +252,52 @@ mod tests {
     fn lengths_follow_the_sequence_of_luby() {
         let first: Vec<u64> = (1..=15).map(luby).collect();
         assert_eq!(first, [1, 1, 2, 1, 1, 2, 4, 1, 1, 2, 1, 1, 2, 4, 8]);
+    }
+
+    #[test]
+    fn a_strict_walk_goes_where_all_others_must_be_at_rest() {
+        // Three machines go up twelve levels: whoever came to a level last stays there until the others are idle, so
+        // the first that starts beside another ends below the third. Whose turn it is at first makes plans hope for more.
+        const MACHINES: u32 = 3;
+        const LEVELS: u32 = 12;
+        let (idle, mut next) = (|m: u32| m, MACHINES);
+        let mut place = || {
+            next += 1;
+            next - 1
+        };
+        let at: Vec<Vec<u32>> = (0..MACHINES).map(|_| (0..=LEVELS).map(|_| place()).collect()).collect();
+        let turn: Vec<Vec<u32>> = (0..LEVELS).map(|_| (0..MACHINES).map(|_| place()).collect()).collect();
+        let mut transitions = Vec::new();
+        for m in 0..MACHINES {
+            let others = || (0..MACHINES).filter(move |&k| k != m);
+            let all_idle: Vec<u32> = others().map(idle).collect();
+            transitions.push(Transition::new(&[idle(m)], &[at[m as usize][0]], &[], &[], &[]));
+            for (l, turn) in turn.iter().enumerate() {
+                let (from, to) = (at[m as usize][l], at[m as usize][l + 1]);
+                let (asked, tested) = (place(), place());
+                transitions.push(Transition::new(&[from], &[asked], &[turn[m as usize]], &[], &[]));
+                for k in others().map(|k| turn[k as usize]) {
+                    transitions.push(Transition::new(&[from, k], &[asked, turn[m as usize]], &[], &[], &[]));
+                    transitions.push(Transition::new(&[asked], &[to], &[k], &[], &[]));
+                }
+                transitions.push(Transition::new(&[asked], &[tested], &[turn[m as usize]], &[], &[]));
+                transitions.push(Transition::new(&[tested], &[to], &all_idle, &[], &[]));
+            }
+        }
+        let initial: Vec<u32> = (0..MACHINES).map(idle).chain(turn.iter().map(|turn| turn[0])).collect();
+        let goals: Vec<u32> = at.iter().map(|at| at[LEVELS as usize]).collect();
+        let net = Net::new(next as usize, transitions, &initial).expect("well formed");
+        let dependencies = Dependencies::new(&net);
+        for (seed, goal) in (0..20).flat_map(|seed| goals.iter().map(move |&goal| (seed, goal))) {
+            let nodes = vec![Node::Literal(literal(goal, true))];
+            let mut target = Target::Formula(Formula::new(nodes, next as usize).expect("well formed"));
+            let mut poll = unwatched;
+            // Two walks of other kinds end before.
+            let (found, steps) =
+                walk(&net, &dependencies, &mut target, seed, 3 * UNIT as u64, &mut Watch::new(None, &mut poll));
+            let path = found.expect("not stopped").expect("met");
+            assert!(path.len() <= 1 + 3 * LEVELS as usize && steps <= 3 * UNIT as u64, "{} {steps}", path.len());
+        }
     }
 
     #[test]
