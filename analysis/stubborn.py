@@ -255,7 +255,7 @@ class FiringSearch:
         self.projections = Projections(net, self.runs.limits)
         self.closed_by: dict[str, None] = {}
         self.dead_by: dict[str, None] = {}
-        self.budget, self.turn = _TOGETHER_FIRST, 0
+        self.budget, self.turn, self.walks = _TOGETHER_FIRST, 0, 0
         self.until_dead = False
 
     def found(self, limits: Limits, *, until_dead: bool = False) -> Firings:
@@ -314,10 +314,13 @@ class FiringSearch:
         Each turn walks anew, and towards all transitions, because those that are easily met lead to the others; it ends
         when so many firings in a row have met none: no other stage meets as many.
         """
-        everything, firings = range(len(self.runs.net.transitions)), _WALKED[min(turn, 1)] * 4 ** max(0, turn - 1)
+        everything, firings = range(len(self.runs.net.transitions)), _WALKED[min(turn, 1)] * 2 ** max(0, turn - 1)
         limits = engine_limits(self.runs.limits.deadline)
-        found, deadlock, steps = self.runs.engine.cover(list(everything), seed=SEED + turn, max_vain=firings, **limits)
+        found, deadlock, steps = self.runs.engine.cover(
+            list(everything), seed=SEED + self.walks, max_vain=firings, **limits
+        )
         self.runs.edges += steps
+        self.walks += 1
         needed = set[int]()
         for way, (after, _, firable) in reversed(list(enumerate(found))):
             if way in needed or any(t in self.open for t, _ in firable):

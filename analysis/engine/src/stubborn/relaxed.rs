@@ -63,11 +63,11 @@ impl<'a> Relaxed<'a> {
         true
     }
 
-    /// Lets no plan take these tokens.
-    fn hold(&mut self, tokens: &[&[u32]]) {
+    /// Lets no plan change these places, which make the literals true.
+    fn hold(&mut self, places: &[&[Literal]]) {
         self.still.clear();
-        for &place in tokens.iter().copied().flatten() {
-            self.net.makers.of(literal(place, false)).iter().for_each(|&t| _ = self.still.insert(t));
+        for &l in places.iter().copied().flatten() {
+            self.net.makers.of(negation(l)).iter().for_each(|&t| _ = self.still.insert(t));
         }
     }
 
@@ -195,7 +195,9 @@ pub(super) struct Plan<'a> {
     steps: usize,
     /// What the target was replaced by for this walk, in a strict one.
     goal: Vec<Literal>,
-    /// Whether some tokens stay where they are.
+    /// What may be left as it is where it is so: tokens, and places empty that something only reads.
+    restful: Vec<Literal>,
+    /// Whether some of it is.
     strict: bool,
     /// Whether now and then something is fired that is not of the plan.
     stray: bool,
@@ -203,11 +205,19 @@ pub(super) struct Plan<'a> {
 
 impl<'a> Plan<'a> {
     pub(super) fn new(net: &'a Dependencies, places: usize, transitions: usize) -> Self {
+        let reads_empty = |p: u32| {
+            let empty = literal(p, false);
+            net.needers.of(empty).iter().any(|&t| !net.flipped(t).contains(&empty))
+        };
         Plan {
             relaxed: Relaxed::new(net, places, transitions),
             left: Vec::new(),
             steps: 0,
             goal: Vec::new(),
+            restful: (0..places as u32)
+                .flat_map(|p| [Some(literal(p, true)), reads_empty(p).then_some(literal(p, false))])
+                .flatten()
+                .collect(),
             strict: false,
             stray: true,
         }
@@ -225,20 +235,20 @@ impl<'a> Plan<'a> {
     /// the others where they are, too. False where there is no plan. Also the work.
     ///
     /// Where many do the same, a plan for one has others do a part of it, as if what they are asked for had no price. One
-    /// that must find all others at rest is then on no such way. With these at rest it is. Which tokens must move is
-    /// found by halving (Junker, "QuickXplain", 2004), in an order that is drawn.
+    /// that must find all others at rest is then on no such way. With these at rest it is. Who is at rest may also be seen
+    /// by an empty place alone, above all in a reduced net. Which of all this must change is found by halving (Junker,
+    /// "QuickXplain", 2004), in an order that is drawn.
     pub(super) fn freeze(&mut self, marking: &[u64], goal: &[Literal], random: &mut Random) -> (bool, usize) {
         self.forget();
         self.strict = true;
         self.stray = random.below(2) == 0;
         self.steps = PLAN_STEPS;
-        let places = self.relaxed.layer.len() as u32 / 2;
-        let mut tokens: Vec<u32> = (0..places).filter(|&p| is_true(literal(p, true), marking)).collect();
-        for i in (1..tokens.len()).rev() {
-            tokens.swap(i, random.below(i + 1));
+        let mut now: Vec<Literal> = self.restful.iter().copied().filter(|&l| is_true(l, marking)).collect();
+        for i in (1..now.len()).rev() {
+            now.swap(i, random.below(i + 1));
         }
         let mut plans = 0;
-        let mut there_is = |frozen: &[&[u32]], plan: &mut Self, random: &mut Random| {
+        let mut there_is = |frozen: &[&[Literal]], plan: &mut Self, random: &mut Random| {
             plans += 1;
             plan.relaxed.hold(frozen);
             plan.relaxed.plan(marking, goal, random, &mut plan.left)
@@ -247,15 +257,15 @@ impl<'a> Plan<'a> {
             return (false, self.size());
         }
         // What is behind `open` stays; before it, one after the other is found that must not.
-        let mut open = tokens.len();
-        let mut rest: Vec<u32> = Vec::new();
-        while !there_is(&[&tokens[..open], &rest], self, random) {
+        let mut open = now.len();
+        let mut rest: Vec<Literal> = Vec::new();
+        while !there_is(&[&now[..open], &rest], self, random) {
             let (mut low, mut high) = (0, open);
             while high - low > 1 {
                 let middle = (low + high) / 2;
-                if there_is(&[&tokens[middle..open], &rest], self, random) { high = middle } else { low = middle }
+                if there_is(&[&now[middle..open], &rest], self, random) { high = middle } else { low = middle }
             }
-            rest.extend(&tokens[high..open]);
+            rest.extend(&now[high..open]);
             open = high - 1;
         }
         (true, plans * self.size())
