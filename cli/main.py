@@ -232,7 +232,7 @@ def _ended_by(error: Exception, arguments: Sequence[str]) -> int:
         case click.exceptions.NoArgsIsHelpError():
             error.show()
             return ExitCode.INPUT_ERROR
-        case click.Abort():
+        case click.Abort() | RuntimeError(__cause__=KeyboardInterrupt()):  # Python 3.11 wraps what a class body raises
             click.echo("interrupted: nothing is known yet", err=True)
             return ExitCode.UNKNOWN
         case click.ClickException():
