@@ -43,6 +43,11 @@ class DryRunDriver:
         """Nothing, likewise."""
         return ()
 
+    @property
+    def tells_each_sensor(self) -> bool:
+        """Always, at the start."""
+        return True
+
     def readings(self) -> Mapping[str, Reading]:
         """What the sensors show."""
         return {name: Reading(value, quality=Quality.GOOD, why="") for name, value in self.shown.items()}

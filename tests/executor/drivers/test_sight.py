@@ -12,6 +12,8 @@ from firable.executor.drivers.bench import until
 from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.bound import bound_driver
 from firable.executor.drivers.device import Value
+from firable.executor.drivers.driver import Driver
+from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
@@ -67,6 +69,11 @@ def theirs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kinds, "entry_points", lambda **_: [one])
 
 
+def run_of(net: Net, driver: Driver) -> Host:
+    conduct = Conduct(operator=lambda _: asyncio.sleep(600))
+    return Host(split(net), driver, Recorder(net, net_digest(net), None), conduct)
+
+
 class Rig:
     """A host, its device at the far end, and what was written there."""
 
@@ -77,12 +84,7 @@ class Rig:
         self.written: list[Value] = []
 
     def host(self) -> Host:
-        return Host(
-            split(self.net),
-            bound_driver(self.binding, self.net),
-            Recorder(self.net, net_digest(self.net), None),
-            Conduct(operator=lambda _: asyncio.sleep(600)),
-        )
+        return run_of(self.net, bound_driver(self.binding, self.net))
 
     async def connect(self) -> None:
         await self.far.start(lambda _, value: self.written.append(value))
@@ -163,6 +165,19 @@ def test_a_gate_of_a_signal_that_is_never_shown_stays_closed_and_others_open() -
         await until(lambda: any("'a.someone' (at someone)" in one for one in host.driver.unreached), "that is told")
         await host.quiet()
         assert (host.recorder.firings["turn"], host.recorder.firings["go"]) == (1, 0)
+        await ended(host, ending)
+
+    asyncio.run(main())
+
+
+@pytest.mark.parametrize("net", [ALONE, TOGETHER], ids=["alone", "voted"])
+def test_in_a_dry_run_a_sensor_that_shows_1_is_no_0_at_first(net: Net) -> None:
+    async def main() -> None:
+        host = run_of(net, DryRunDriver(split(net).subnets, 0.01))
+        ending = asyncio.create_task(host.main())
+        await until(lambda: host.recorder.firings["turn"] > 0, "the sensors are told")
+        await host.quiet()
+        assert host.recorder.firings["go"] == 0
         await ended(host, ending)
 
     asyncio.run(main())
