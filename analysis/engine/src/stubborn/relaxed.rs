@@ -21,6 +21,8 @@ use crate::random::Random;
 const PLAN_STEPS: usize = 64;
 /// How many transitions are drawn before one is fired that moves what is to stay.
 const DRAWS: usize = 8;
+/// The work of plans after which a strict one looks for no more tokens that may stay: some hundredths of a second.
+const HALVING: usize = 1 << 22;
 const NEVER: u32 = u32::MAX;
 
 /// Room for plans in one net.
@@ -237,7 +239,8 @@ impl<'a> Plan<'a> {
     /// Where many do the same, a plan for one has others do a part of it, as if what they are asked for had no price. One
     /// that must find all others at rest is then on no such way. With these at rest it is. Who is at rest may also be seen
     /// by an empty place alone, above all in a reduced net. Which of all this must change is found by halving (Junker,
-    /// "QuickXplain", 2004), in an order that is drawn.
+    /// "QuickXplain", 2004), in an order that is drawn. Each takes some plans, so where they are thousands, those that were
+    /// not found by then may move with all that was not looked at.
     pub(super) fn freeze(&mut self, marking: &[u64], goal: &[Literal], random: &mut Random) -> (bool, usize) {
         self.forget();
         self.strict = true;
@@ -247,28 +250,28 @@ impl<'a> Plan<'a> {
         for i in (1..now.len()).rev() {
             now.swap(i, random.below(i + 1));
         }
-        let mut plans = 0;
-        let mut there_is = |frozen: &[&[Literal]], plan: &mut Self, random: &mut Random| {
-            plans += 1;
+        let mut work = 0;
+        let mut there_is = |frozen: &[&[Literal]], plan: &mut Self, work: &mut usize| {
+            *work += plan.size();
             plan.relaxed.hold(frozen);
             plan.relaxed.plan(marking, goal, random, &mut plan.left)
         };
-        if !there_is(&[], self, random) {
-            return (false, self.size());
+        if !there_is(&[], self, &mut work) {
+            return (false, work);
         }
         // What is behind `open` stays; before it, one after the other is found that must not.
         let mut open = now.len();
         let mut rest: Vec<Literal> = Vec::new();
-        while !there_is(&[&now[..open], &rest], self, random) {
+        while !there_is(&[&now[..open], &rest], self, &mut work) {
             let (mut low, mut high) = (0, open);
             while high - low > 1 {
                 let middle = (low + high) / 2;
-                if there_is(&[&now[middle..open], &rest], self, random) { high = middle } else { low = middle }
+                if there_is(&[&now[middle..open], &rest], self, &mut work) { high = middle } else { low = middle }
             }
             rest.extend(&now[high..open]);
-            open = high - 1;
+            open = if work < HALVING { high - 1 } else { 0 };
         }
-        (true, plans * self.size())
+        (true, work)
     }
 
     /// Whether there is something left to do for the plan; of a strict one, now.
@@ -383,6 +386,20 @@ mod tests {
             plan.forget();
             assert!(plan.towards(&walker, &[literal(8, true)], &mut random));
         }
+    }
+
+    #[test]
+    fn of_thousands_of_tokens_that_must_move_a_strict_plan_finds_some() {
+        const MANY: u32 = 1500;
+        let transitions = (0..MANY).map(|p| Transition::new(&[p], &[p + MANY], &[], &[], &[])).collect();
+        let tokens: Vec<u32> = (0..MANY).collect();
+        let net = Net::new(2 * MANY as usize, transitions, &tokens).expect("well formed");
+        let dependencies = Dependencies::new(&net);
+        let goal: Vec<Literal> = (MANY..2 * MANY).map(|p| literal(p, true)).collect();
+        let mut plan = Plan::new(&dependencies, 2 * MANY as usize, MANY as usize);
+        let (is_planned, work) = plan.freeze(&net.initial, &goal, &mut Random::new(1));
+        assert!(is_planned && (HALVING..HALVING + 20 * plan.size()).contains(&work), "{work}");
+        assert_eq!(plan.left.len(), MANY as usize);
     }
 
     #[test]
