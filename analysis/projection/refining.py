@@ -108,7 +108,7 @@ def known_by_projection(net: Net, limits: Limits) -> Mapping[str, Known]:
     search, witnesses = Projections(net, limits), Witnesses(net, Discipline.INTERLEAVING)
     open_ = set(range(len(net.transitions)))
     for t in range(len(net.transitions)):
-        if search.dead:
+        if search.dead or limits.deadline.over:
             break
         if t not in open_:
             continue
@@ -190,6 +190,8 @@ class Projections:
             on_these = self._on(self.kept)
             if (run := on_these.run_into(goal)) is None:
                 return on_these
+            if self.limits.deadline.over:  # what is small is explored all the same
+                raise BudgetExceeded(_NO_TIME)
 
     def firing(self, t: int) -> tuple[int, ...] | Explored:
         """The same for the goal that a transition may fire."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from threading import Event
 
 import pytest
 from hypothesis import given
@@ -17,7 +18,7 @@ from support.searched import goals, played, satisfies
 from firable.analysis import stubborn
 from firable.analysis._engine import BudgetExceeded
 from firable.analysis.compiled import nodes_of
-from firable.analysis.deadline import Deadline
+from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.certificate import Diagram, Labelling
 from firable.analysis.evidence.checking.checker import check_evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind
@@ -25,7 +26,7 @@ from firable.analysis.evidence.document import document_from_text
 from firable.analysis.evidence.producing.claims import Certifier
 from firable.analysis.goal import Limits
 from firable.analysis.projection import refining
-from firable.analysis.projection.projected import Explored, Room, explored, from_above, projection
+from firable.analysis.projection.projected import Explored, Projection, Room, explored, from_above, projection
 from firable.analysis.projection.refining import Projections, decide_by_projection, known_by_projection
 from firable.analysis.spaces.space import WitnessError
 from firable.analysis.spaces.symbolic import SymbolicSpace
@@ -220,6 +221,28 @@ def test_a_projection_without_room_is_not_explored_again_until_there_is_more(mon
         with pytest.raises(BudgetExceeded):
             search.decide(goal)
     assert asked[2:] == 2 * [Room(5, 0)]
+
+
+def test_nothing_more_is_projected_once_the_time_is_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    net, over, asked = family_net("philosophers_either-10"), Event(), list[Projection]()
+    goal = nodes_of(net, Deadlock())
+
+    def counted(of: Projection, limits: Limits, room: Room) -> Explored:
+        asked.append(of)
+        over.set()
+        return explored(of, replace(limits, deadline=NEVER), room)
+
+    monkeypatch.setattr(refining, "explored", counted)
+    assert Projections(net, Limits()).decide(goal)
+    assert len(asked) > 1
+    asked.clear()
+    over.clear()
+    limits = Limits(Deadline(cancelled=over))
+    with pytest.raises(BudgetExceeded):
+        Projections(net, limits).decide(goal)
+    assert len(asked) == 1
+    monkeypatch.setattr(Projections, "firing", lambda *_: pytest.fail("the time is over"))
+    assert known_by_projection(net, limits) == {}
 
 
 def test_what_is_too_large_is_left_undecided_and_says_how_many_places_were_kept() -> None:
