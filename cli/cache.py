@@ -80,14 +80,15 @@ class Cache:
             "figures": found.figures,
             "course": list(found.course),
         }
-        text = json.dumps(data, ensure_ascii=False)
         try:
+            text = json.dumps(data, ensure_ascii=False)
             make_folder(self.folder)
             write_whole(self.folder / key, f"{_sha256(text)}\n{text}")
             entries = sorted(self.folder.iterdir(), key=lambda entry: entry.stat().st_mtime)
             for entry in entries[:-_ENTRIES_MAX]:
                 entry.unlink(missing_ok=True)
-        except (InputError, OSError):  # a full disk or a folder of somebody else's is no reason to fail a check
+        except (InputError, OSError, ValueError):
+            # A full disk, a folder of somebody else's, a number of too many digits: no reason to fail a check.
             return
 
 

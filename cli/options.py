@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -369,6 +371,18 @@ def _rendered(format_: str, outcome: Outcome) -> str:
             import json
 
             data = document(outcome.command, outcome.reports, outcome.errors, outcome.exit_code)
-            text = json.dumps(data, indent=2, ensure_ascii=False) + "\n"
+            with _all_digits():
+                text = json.dumps(data, indent=2, ensure_ascii=False) + "\n"
             # The bytes of a file's name that are no UTF-8 stand as escapes, as they would in ASCII.
             return text.encode(errors="backslashreplace").decode()
+
+
+@contextmanager
+def _all_digits() -> Iterator[None]:
+    """Let numbers of any length be written: of the markings that a diagram holds, which no input names."""
+    longest = sys.get_int_max_str_digits()
+    sys.set_int_max_str_digits(0)
+    try:
+        yield
+    finally:
+        sys.set_int_max_str_digits(longest)

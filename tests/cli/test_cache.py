@@ -15,7 +15,7 @@ from support.interrupting import ended
 from firable.analysis.check import check
 from firable.analysis.report import CheckReport
 from firable.analysis.spaces.reachability import ReachabilityGraph
-from firable.cli.cache import key_of
+from firable.cli.cache import Cache, Kept, key_of
 from firable.cli.main import main
 from firable.nets.catalogue import catalogue_net
 from firable.nets.net import Net
@@ -212,6 +212,11 @@ def test_a_cache_that_cannot_be_written_is_no_reason_to_fail(
     first = checked(folder, NET, capsys)
     assert checked(folder, NET, capsys) == first
     assert len(explored) == 2
+
+
+def test_what_has_too_many_markings_to_be_read_again_is_not_kept(folder: Path) -> None:
+    Cache(folder / "cache").write("key", Kept((), {"markings": 10**5000}, ()))
+    assert not (folder / "cache").exists()
 
 
 def test_a_structure_that_its_time_cut_short_is_asked_again(

@@ -13,6 +13,7 @@ import jsonschema
 import pytest
 from junitparser import Error, Failure, JUnitXml
 
+from firable.analysis.report import Figures
 from firable.cli.main import main
 from firable.nets.catalogue import catalogue_path
 from firable.nets.text import parse_net
@@ -230,6 +231,16 @@ def test_reports_are_written_to_files_beside_what_is_printed(here: Path, capsys:
     )
     assert JUnitXml.fromfile(str(here / "out.xml")).failures == 3
     assert json.loads((here / "out.json").read_text("utf-8"))["exit_code"] == 1
+
+
+def test_a_number_of_markings_of_any_length_is_written_in_json(
+    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    to_json, longest = Figures.to_json, sys.get_int_max_str_digits()
+    monkeypatch.setattr(Figures, "to_json", lambda of: to_json(of) | {"markings": 10**5000})
+    text = printed(capsys, "safe.firable.yaml", "--format", "json", code=0)
+    assert f'"markings": 1{"0" * 5000},' in text
+    assert sys.get_int_max_str_digits() == longest
 
 
 def test_no_report_is_written_over_what_is_read(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
