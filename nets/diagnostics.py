@@ -11,6 +11,7 @@ in docs/codes with an example that is run (or a row in tests/support/exact_words
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -279,7 +280,7 @@ def did_you_mean(name: str, known: Sequence[str]) -> str:
         return f"'{alike}' looks the same, and is written with other characters: copy it from there; "
     owner, _, own = name.rpartition(".")
     elsewhere = [one for one in known[:20_000] if one.endswith(f".{own}")] if owner else []
-    if len(elsewhere) == 1:
+    if len(elsewhere) == 1 and not _is_opposite(name, elsewhere[0]):
         return f"did you mean '{elsewhere[0]}'? "
     # Comparing is slow where both are many or long: a hint is not worth a minute.
     known = [candidate for candidate in known if abs(len(candidate) - len(name)) <= 4][:2000] if len(name) <= 80 else []
@@ -290,16 +291,31 @@ def did_you_mean(name: str, known: Sequence[str]) -> str:
 def _is_slip(name: str, meant: str) -> bool:
     """Whether each part of a name is as it is meant, but for a slip: what they share, such as an owner, says nothing.
 
-    >>> _is_slip("lathe.fere", "lathe.free"), _is_slip("lathe.reset", "lathe.free")
-    (True, False)
+    >>> _is_slip("lathe.fere", "lathe.free"), _is_slip("lathe.reset", "lathe.free"), _is_slip("p.unlocked", "p.locked")
+    (True, False, False)
     """
     parts, others = name.split("."), meant.split(".")
+    if _is_opposite(name, meant) or _is_opposite(parts[-1], others[-1]):
+        return False
     if len(parts) != len(others):
         return True
     return all(
         a.startswith(b) or b.startswith(a) or _edits(a, b) <= max(1, max(len(a), len(b)) // 3)
         for a, b in zip(parts, others, strict=True)
     )
+
+
+_DENIAL: Final = re.compile(r"(?:no?|non|not|un|in|dis|de)[_-]*|-")
+
+
+def _is_opposite(a: str, b: str) -> bool:
+    """Whether one word denies the other, as `nok`, `not_ok` and `unlocked` do: no slip leads from one to the other.
+
+    >>> _is_opposite("nok", "ok"), _is_opposite("part", "no_part"), _is_opposite("parts", "part")
+    (True, True, False)
+    """
+    short, long = sorted((a.lower(), b.lower()), key=len)
+    return long.endswith(short) and _DENIAL.fullmatch(long.removesuffix(short)) is not None
 
 
 def _edits(a: str, b: str) -> int:

@@ -59,6 +59,7 @@ from firable.nets.time_limits import (
     timer_name,
 )
 from firable.nets.verdict import Expectation, Status
+from firable.nets.written_as_one import meant_by, written_as_one
 from firable.nets.yaml_tree import Node, data, parse_tree
 
 SIZE_BYTES_MAX: Final = 16 * 1024 * 1024
@@ -333,12 +334,10 @@ class _Reading:
 
 
 def _unknown_start(scope: _Scope, local: str, subject: Subject) -> Diagnostic:
-    from firable.nets.diagnostics import did_you_mean
-
     if scope.is_full(local):
         hint = scope.said_local(local)
-    else:
-        hint = did_you_mean(local, list(scope.places)) + "`start` names places of the same `places`"
+    elif not (hint := written_as_one(local, scope.places, "start")):
+        hint = meant_by(local, list(scope.places)) + "`start` names places of the same `places`"
     return Diagnostic("F2002", f"there is no place '{scope.full(local)}' to start in", hint, subject)
 
 

@@ -30,6 +30,7 @@ from firable.nets.source import quoted
 from firable.nets.temporal import Fires, logics
 from firable.nets.temporal_parts import atoms_in
 from firable.nets.time_limits import limit_problems
+from firable.nets.written_as_one import is_one_name, meant_by, written_as_one
 
 FORBIDDEN_IN_NAMES: Final = frozenset(" \t\r\n()[]{},:#&*!|>'\"%@`\\")
 
@@ -89,7 +90,7 @@ def _duplicate_names(net: Net) -> Iterator[Diagnostic]:
                 yield Diagnostic(
                     "F2012",
                     f"{name!r} is not a name for a {singular}",
-                    "use letters, digits, '_', '-' and '.'",
+                    _as_inputs(net, name) or "use letters, digits, '_', '-' and '.'",
                     (kind, name),
                 )
             if name in seen:
@@ -105,6 +106,12 @@ def _duplicate_names(net: Net) -> Iterator[Diagnostic]:
                         (kind, name),
                     )
                 nodes.setdefault(name, kind)
+
+
+def _as_inputs(net: Net, name: str) -> str:
+    """The hint on the name of a sensor that is a list of names."""
+    sensors = (signal for signal in net.signals if signal.name == name and signal.kind is SignalKind.SENSOR)
+    return next((written_as_one(name.removeprefix(f"{one.owner}."), (), "inputs") for one in sensors), "")
 
 
 def _ownership(net: Net, controllers: set[str]) -> Iterator[Diagnostic]:
@@ -183,7 +190,7 @@ def _completions(net: Net) -> Iterator[Diagnostic]:
         subject: Subject = ("places", place.name, "until")
         signal = signals.get(place.completion)
         if signal is None:
-            yield _unknown_name("F2003", "signal", place.completion, signals, subject)
+            yield _unknown_name("F2003", "signal", place.completion, signals, subject, "until")
         elif signal.kind is not SignalKind.COMPLETION:
             declared = "a sensor" if signal.kind is SignalKind.SENSOR else "a timer"
             yield Diagnostic(
@@ -310,20 +317,20 @@ def _transition_problems(transition: Transition, known: _Known) -> Iterator[Diag
             elif not is_gate:
                 own = name.rpartition(".")[2]
                 alike = [signal for signal in signals if signal.rpartition(".")[2] == own]
-                unknown = _unknown_name("F2002", "place", name, places, subject)
-                if len(alike) == 1:
+                unknown = _unknown_name("F2002", "place", name, places, subject, key)
+                if len(alike) == 1 and is_one_name(name):
                     hint = f"'{alike[0]}' is a signal, which can be a gate: write it under `if` or `unless`"
                     unknown = replace(unknown, hint=hint)
                 yield unknown
             elif name not in signals:
-                yield _unknown_name("F2021", "place or signal", name, places | signals, subject)
+                yield _unknown_name("F2021", "place or signal", name, places | signals, subject, key)
             else:
                 raise ValueError(f"the internal gate '{name}' of '{transition.name}' is a signal: its gate is external")
     seen_gates: set[ExternalGate] = set()
     for gate in transition.external:
         subject = ("transitions", transition.name, "if" if gate.wanted else "unless", gate.signal)
         if gate.signal not in signals:
-            yield _unknown_name("F2003", "signal", gate.signal, signals, subject)
+            yield _unknown_name("F2003", "signal", gate.signal, signals, subject, subject[2])
         if gate in seen_gates:
             yield Diagnostic(
                 "F2022", f"the gate '{gate.signal}' of '{transition.name}' stands twice", "write it once", subject
@@ -364,7 +371,7 @@ def _arbiters(net: Net) -> Iterator[Diagnostic]:
             )
         for name in dict.fromkeys(arbiter.among):
             if name not in names:
-                yield _unknown_name("F2004", "transition", name, names, (*subject, name))
+                yield _unknown_name("F2004", "transition", name, names, (*subject, name), "among")
             elif (other := taken.setdefault(name, arbiter.name)) != arbiter.name:
                 yield Diagnostic(
                     "F2013",
@@ -413,14 +420,14 @@ def unknown_in_formula(
             said = f"write `firable({name})` where it may fire, or name a place"
             return Diagnostic("F2002", f"{quoted(name)} is a transition, and no place", said, subject)
         known = {place.name for place in net.places} | (words - {name})
-        return _unknown_name("F2002", kind, name, known, subject, hint)
+        return _unknown_name("F2002", kind, name, known, subject, hint=hint)
     if any(place.name == name for place in net.places):
         filling = next(
             (f", such as '{one.name}', which puts a token on it" for one in net.transitions if name in one.outputs), ""
         )
         said = f"write `{name}` for a token on it, or name a transition{filling}"
         return Diagnostic("F2004", f"{quoted(name)} is a place, and no transition", said, subject)
-    return _unknown_name("F2004", kind, name, {transition.name for transition in net.transitions}, subject, hint)
+    return _unknown_name("F2004", kind, name, {transition.name for transition in net.transitions}, subject, hint=hint)
 
 
 def _unknown_name(
@@ -429,18 +436,21 @@ def _unknown_name(
     name: str,
     known: Collection[str],
     subject: Subject,
+    key: str = "",
     hint: str = "declare it first, or correct the name",
 ) -> Diagnostic:
-    """The diagnostic on a name that nothing has, with the known name that was probably meant."""
+    """The diagnostic on a name that nothing has, with the known name that was probably meant under this key."""
     message, (owner, _, own) = f"there is no {kind} {quoted(name)}", name.partition(".")
+    if as_one := written_as_one(name, known, key):
+        return Diagnostic(code, message, as_one, subject)
     if f"{owner}.{name}" in known:  # declared by its full name, where the local one is expected
         full = quoted(f"{owner}.{name}")
         said = f"{full} is declared: inside {quoted(owner)} names are local, so write {quoted(own)} there"
         return Diagnostic(code, message, said, subject)
     local = min((full for full in known if full.rpartition(".")[2] == name), default=None)
     # Names much longer or shorter are no slips of the pen, and would be sorted for nothing.
-    similar = sorted(full for full in known if abs(len(full) - len(name)) <= 4)
-    suggestion = f"did you mean {quoted(local)}? " if local else did_you_mean(name, similar)
+    similar = sorted(full for full in known if abs(len(full) - len(name)) <= 4 and is_name(full))
+    suggestion = f"did you mean {quoted(local)}? " if local else meant_by(name, similar)
     return Diagnostic(code, message, f"{suggestion}{hint}", subject)
 
 

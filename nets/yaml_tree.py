@@ -52,6 +52,8 @@ _FORBIDDEN: Final = re.compile("[^\t\n\r -~\xa0-\u2027\u202a-\ud7ff\ue000-\ufffd
 _PLAIN_VALUE: Final = re.compile(r""":\s+[^\s"'{\[][^{}\[\],]*$""")
 """A value without quotes, up to the end."""
 
+_NO_TAGS: Final = "'!' begins a tag, and a net needs none: where a gate was to be negated, write `unless` for `if`"
+
 _TOO_DEEP: Final = "exceeded maximum nesting depth"
 """What libyaml says from 1,000 levels on, in versions that have such a bound."""
 
@@ -154,6 +156,8 @@ def _syntax_error(source: Source, error: yaml.MarkedYAMLError) -> InputError:
     text = source.lines[line - 1]
     if "\t" in text[: column + 1]:
         hint = "indent with spaces: YAML forbids tabs there"
+    elif error.context == "while scanning a tag":
+        hint = _NO_TAGS
     elif text[column - 1 : column] == ":" and _PLAIN_VALUE.search(text[: column - 1]):
         hint = "write a text with a colon and a blank in it in double quotes"
     elif ":" in text or not text.strip():
@@ -234,7 +238,8 @@ class _Builder:
                 column,
             )
         if (tag := getattr(event, "tag", None)) is not None:
-            raise self.source.refuse("F1007", f"{quoted(tag)} is a tag", "delete it: a net needs no tags", line, column)
+            hint = _NO_TAGS if tag.startswith("!") else "delete it: a net needs no tags"
+            raise self.source.refuse("F1007", f"{quoted(tag)} is a tag", hint, line, column)
 
     def add(self, node: Node) -> None:
         self.nodes += 1

@@ -23,6 +23,7 @@ from firable.nets.tasks import document as doc
 from firable.nets.tasks.model import Catalogue, Gate, Move, Role, Step, Subtask, Task
 from firable.nets.time_limits import no_time, parse_time
 from firable.nets.well_formed import is_name
+from firable.nets.written_as_one import meant_by, written_as_one
 from firable.nets.yaml_tree import Node, Scalar, Sequence, data, node_span, nodes_along, parse_tree
 
 SIZE_BYTES_MAX: Final = 1024 * 1024
@@ -298,7 +299,7 @@ class _Reading:
                     self.problem(double, f"'{one}' stands twice in `{key}` of '{name}'", "write it once", at, one)
                 elif one not in known:
                     what = "role" if key == "release" else "step" if known is places else "step or sensor"
-                    hint = did_you_mean(one, known) + _KNOWN_HINT[what]
+                    hint = written_as_one(one, known, key) or meant_by(one, known) + _KNOWN_HINT[what]
                     self.problem("F2025", f"there is no {what} '{one}' in the task '{self.name}'", hint, at, one)
                 seen.add(one)
         return Move(
