@@ -69,18 +69,19 @@ def opened(
         names = machines or (*coordinators(decomposition), *(subnet.name for subnet in decomposition.subnets))
         if journal_path is not None:
             journal = stack.enter_context(closing(SqliteJournal(journal_path, digest, names)))
-            if simulated is not None:
-                cell = stack.enter_context(closing(CellLog(f"{journal_path}.cell", *simulated)))
         kept = journal.kept(TRACE).get(KEY)
         begun = any(journal.kept(name) for name in names)
-        if cell is not None and begun:
-            _demand_the_cell(cell, net, kept)
         is_taken_over = begun and kept is None
         if isinstance(trace, Path | str):
-            if is_taken_over:
-                _demand_an_empty_one(trace)
-            elif begun:
+            if begun and not is_taken_over:
                 _demand_the_same(trace, kept)
+            elif journal_path is not None or simulated is None:
+                _demand_an_empty_one(trace, is_taken_over=is_taken_over)
+        if journal_path is not None and simulated is not None:
+            cell = stack.enter_context(closing(CellLog(f"{journal_path}.cell", *simulated)))
+            if begun:
+                _demand_the_cell(cell, net, kept)
+        if isinstance(trace, Path | str):
             trace = stack.enter_context(closing(TraceFile(trace, size_bytes_of(kept))))
         now = time.time() if machines else 0.0
         start = start_of(decomposition, names, journal) if is_taken_over else None
@@ -102,14 +103,18 @@ def _demand_the_same(path: Path | str, kept: Stored | None) -> None:
     raise InputError([Diagnostic("F1017", message, hint)])
 
 
-def _demand_an_empty_one(path: Path | str) -> None:
-    """A takeover begins another trace; the one until then, of the same machines, is written over by no start script."""
+def _demand_an_empty_one(path: Path | str, *, is_taken_over: bool) -> None:
+    """What machines have done once is in no other file than its trace: a run that begins one writes over none.
+
+    That of a simulated cell without a journal may be written over, as what the same command makes again.
+    """
     with suppress(OSError, ValueError):  # what cannot be looked at, `TraceFile` refuses
         if Path(path).is_file() and Path(path).stat().st_size:
-            message = (
-                f"{printable(str(path))}: the trace of a run that was taken over begins anew, and this file has lines"
-            )
-            hint = "name another file; `firable replay` judges each with the bundle of its time"
+            of = "a run that was taken over" if is_taken_over else "this run"
+            message = f"{printable(str(path))}: the trace of {of} begins anew, and this file has lines"
+            hint = "name another file, or the journal of the run that it is of"
+            if is_taken_over:
+                hint = "name another file; `firable replay` judges each with the bundle of its time"
             raise InputError([Diagnostic("F1017", message, hint)])
 
 

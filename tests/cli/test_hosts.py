@@ -266,10 +266,15 @@ def test_a_host_that_is_started_again_without_its_journal_or_with_an_older_copy_
         processes[1].kill()
         processes[1].wait()
         trace = (tmp_path / "robot.trace").read_bytes()
-        mistyped = ["--journal", str(tmp_path / "rbot.journal"), "--trace", str(tmp_path / "robot.trace")]
-        refused = subprocess.run([*robot, *mistyped], capture_output=True, text=True, timeout=PATIENCE_SECONDS)
+        mistyped = [*robot, "--journal", str(tmp_path / "rbot.journal")]
+        with_trace = [*mistyped, "--trace", str(tmp_path / "robot.trace")]
+        refused = subprocess.run(with_trace, capture_output=True, text=True, timeout=PATIENCE_SECONDS)
         assert refused.returncode == 2
         assert (tmp_path / "robot.trace").read_bytes() == trace, "who is refused changes no file"
+        assert "error[F1017]" in refused.stderr
+        assert "hint: name another file, or the journal of the run that it is of" in refused.stderr
+        refused = subprocess.run(mistyped, capture_output=True, text=True, timeout=PATIENCE_SECONDS)
+        assert refused.returncode == 2
         assert "error[F5025]: the host of 'system', 'mc', the coordinator has worked with" in refused.stderr
         assert refused.stderr.count("has worked with another journal") == 1
         assert "Traceback" not in refused.stderr

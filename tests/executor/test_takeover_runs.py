@@ -22,7 +22,7 @@ from firable.executor.operating.host import Host
 from firable.executor.operating.taken_up import opened
 from firable.executor.protocol.messages import Keep
 from firable.nets.bundle import read_bundle
-from firable.nets.catalogue import catalogue_path
+from firable.nets.catalogue import catalogue_path, catalogue_plant
 from firable.nets.diagnostics import InputError
 from firable.semantics.joining import join
 from firable.semantics.replaying import replay
@@ -115,6 +115,22 @@ def test_the_trace_of_the_time_before_a_takeover_is_not_written_over(
             free.touch()
         with opened(read.decomposition, read.digest, after, free):
             pass
+
+
+def test_a_run_of_machines_begins_in_the_trace_of_no_other_one(bundles: tuple[Path, Path], tmp_path: Path) -> None:
+    read, earlier = read_bundle(bundles[0]), tmp_path / "cell.trace"
+    earlier.write_text("what an earlier run has told\n")
+    cell = (catalogue_plant("one_robot"), 1, 0)
+    for journal_path, simulated in (("new.journal", None), (None, None), ("simulated.journal", cell)):
+        kept = None if journal_path is None else tmp_path / journal_path
+        with pytest.raises(InputError, match="the trace of this run begins anew, and this file has lines"):
+            opened(read.decomposition, read.digest, kept, earlier, simulated=simulated).__enter__()
+        assert earlier.read_text() == "what an earlier run has told\n"
+        with opened(read.decomposition, read.digest, kept, tmp_path / f"of {journal_path}.trace", simulated=simulated):
+            pass
+    assert not (tmp_path / "new.journal.cell").exists()
+    with opened(read.decomposition, read.digest, None, earlier, simulated=cell) as again:
+        assert again.begin_seconds == 0.0  # what the same command makes again may be written over
 
 
 def test_the_traces_of_hosts_that_were_taken_over_join_and_not_with_one_that_was_not(tmp_path: Path) -> None:
