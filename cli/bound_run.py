@@ -9,7 +9,7 @@ import click
 
 from firable.cli import text
 from firable.cli.log import told_aside
-from firable.cli.options import binding_of
+from firable.cli.options import binding_for
 from firable.cli.report import Report
 from firable.cli.watched import AFTER_A_FAULT, machines_verdict, show_coalesced, since
 
@@ -27,8 +27,11 @@ def run_bound_of(path: str, bundle: Bundle, bind: str, conduct: Conduct, plant: 
     """Run until the operator stops it or nothing can go on, and report how it ended."""
     from firable.executor.operating.running import run_bound
 
+    binding, notes = binding_for(bind, bundle.net)
+    for note in notes:  # before anything moves
+        text.show_diagnostic(note)
     with told_aside(_told, conduct.log) as tell:
-        report = run_bound(bundle, binding_of(bind), replace(conduct, tell=tell), plant=plant)
+        report = run_bound(bundle, binding, replace(conduct, tell=tell), plant=plant)
     known = report.to_json()
     of_workpieces = {"delivered", "inside", "lost", "doubled", "decided", "simulated_seconds"}
     kept = {key: value for key, value in known.items() if key not in of_workpieces}
@@ -37,6 +40,7 @@ def run_bound_of(path: str, bundle: Bundle, bind: str, conduct: Conduct, plant: 
         path,
         bundle.net,
         (_verdict(report, bind), *machines_verdict(report, f"run on the machines of {bind}")),
+        notes=notes,
         run={**kept, "seconds": report.simulated_seconds, "binding": bind},
     )
 

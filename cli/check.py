@@ -209,7 +209,7 @@ def _report(argument: str, asked: _Asked, evidence_dir: str | None, *, bind: str
 
     loaded = load_found(argument)
     net = loaded.net
-    demand_bound(bind, net)
+    of_binding = demand_bound(bind, net)
     queries = _queries(loaded, asked)
     cache = opened_cache() if asked.cached else None
     key = key_of(net, asked.of_the_net(queries)) if cache is not None else ""
@@ -240,7 +240,7 @@ def _report(argument: str, asked: _Asked, evidence_dir: str | None, *, bind: str
         discipline=asked.discipline,
         figures=kept.figures,
         course=kept.course,
-        notes=loaded.notes,
+        notes=(*loaded.notes, *of_binding),
         files=files,
         binding=bind or "",
         again=again,

@@ -15,7 +15,7 @@ from firable.cli import text
 from firable.cli.files import JOURNAL, READ
 from firable.cli.finite import FiniteRange
 from firable.cli.log import told_aside
-from firable.cli.options import binding_of, is_given, warn_of_open_key
+from firable.cli.options import binding_for, is_given, warn_of_open_key
 from firable.cli.report import Report
 from firable.cli.watched import AFTER_A_FAULT_OF_A_HOST, machines_verdict, show_coalesced
 from firable.nets.source import printable
@@ -191,9 +191,9 @@ def run_host_of(path: str, bundle: Bundle, options: HostOptions, conduct: Conduc
             f"--coordinator is of a net that names none, and in '{bundle.net.name}' '{named.name}' is the one: "
             f"it runs where --controller {named.name} does"
         )
-    drivers = _drivers(bundle, machines, options)
+    drivers, notes = _drivers(bundle, machines, options)
     link, warnings = _link(bundle, machines, options)
-    for warning in warnings:
+    for warning in (*notes, *warnings):
         text.show_diagnostic(warning)
     with told_aside(_told, conduct.log) as tell:
         report = run_host(bundle, machines, drivers, link, replace(conduct, tell=tell), plant=plant)
@@ -202,6 +202,7 @@ def run_host_of(path: str, bundle: Bundle, options: HostOptions, conduct: Conduc
         path,
         bundle.net,
         (_verdict(report.situation, machines), *machines_verdict(report, "run of one host, of its own machines")),
+        notes=notes,
         run=report.to_json(),
     )
 
@@ -224,7 +225,8 @@ def _told(kind: str, sentence: str) -> None:
     click.echo(f"{time.strftime('%H:%M:%S')} {kind}: {sentence}", err=True)
 
 
-def _drivers(bundle: Bundle, machines: tuple[str, ...], options: HostOptions) -> Drivers:
+def _drivers(bundle: Bundle, machines: tuple[str, ...], options: HostOptions) -> tuple[Drivers, tuple[Diagnostic, ...]]:
+    """What makes the driver of this host, and what is to be told of its binding."""
     from firable.executor.operating.hosting import own_net
 
     if options.bind is not None and options.dry_run is not None:
@@ -233,7 +235,8 @@ def _drivers(bundle: Bundle, machines: tuple[str, ...], options: HostOptions) ->
         from firable.executor.drivers.bound import bound_driver
 
         own = own_net(bundle.decomposition, machines)
-        return partial(bound_driver, binding_of(options.bind), bundle.net, own)
+        binding, notes = binding_for(options.bind, bundle.net)
+        return partial(bound_driver, binding, bundle.net, own), notes
     net = own_net(bundle.decomposition, machines)
     if options.dry_run is None and (net.signals or any(place.command for place in net.places)):
         raise click.UsageError("say with --bind where the machines of this host are, or --dry-run without any")
@@ -243,7 +246,7 @@ def _drivers(bundle: Bundle, machines: tuple[str, ...], options: HostOptions) ->
         del latched  # there is nothing to be held safe
         return DryRunDriver([net], options.dry_run or 0.0)
 
-    return dry
+    return dry, ()
 
 
 def _link(bundle: Bundle, machines: tuple[str, ...], options: HostOptions) -> tuple[Link, tuple[Diagnostic, ...]]:

@@ -107,7 +107,7 @@ def loop_report(
     from firable.nets.verdict import held_to
 
     loaded = load_found(argument)
-    demand_bound(bind, loaded.net)
+    of_binding = demand_bound(bind, loaded.net)
     model = read_machines_of(machines, loaded.net)
     interrupted = Event()
     with progress_line(progress) as line:
@@ -132,7 +132,7 @@ def loop_report(
         loaded.net,
         verdicts,
         discipline="interleaving",
-        notes=(*loaded.notes, *late_limits(model, loaded.net)),
+        notes=(*loaded.notes, *of_binding, *late_limits(model, loaded.net)),
         course=course,
         files=files,
         binding=bind or "",

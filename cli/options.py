@@ -104,14 +104,21 @@ def with_page(make: Callable[[], Report], path: str | None) -> Callable[[], Repo
     return make_both
 
 
-def demand_bound(bind: str | None, net: Net) -> None:
-    """Raise `InputError` (F5101, F5102) where a binding is named that does not fit the net."""
-    if bind is not None:
-        from firable.executor.drivers.fitting import misfits
-        from firable.nets.diagnostics import InputError
+def demand_bound(bind: str | None, net: Net) -> tuple[Diagnostic, ...]:
+    """What is to be told of a binding, if one is named; raises `InputError` as `binding_for` does."""
+    return () if bind is None else binding_for(bind, net)[1]
 
-        if problems := misfits(binding_of(bind), net):
-            raise InputError(problems)
+
+def binding_for(bind: str, net: Net) -> tuple[Binding, tuple[Diagnostic, ...]]:
+    """The binding of a net, and what is to be told of it; raises `InputError` (F5101, F5102) where it does not fit."""
+    from firable.executor.drivers.fitting import misfits
+    from firable.executor.drivers.unguarded import unguarded
+    from firable.nets.diagnostics import InputError
+
+    binding = binding_of(bind)
+    if problems := misfits(binding, net):
+        raise InputError(problems)
+    return binding, tuple(unguarded(binding))
 
 
 def binding_of(bind: str) -> Binding:

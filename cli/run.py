@@ -240,8 +240,6 @@ def _demand_a_file(trace: str | None) -> None:
 
 
 def _show(report: Report) -> None:
-    for note in report.notes:
-        text.show_diagnostic(note)
     if "machines" in report.run:
         show_host(report)
     elif "binding" in report.run:

@@ -167,6 +167,7 @@ CODES: Final[dict[str, str]] = {
     "F5104": "a device that cannot be served here",
     "F5105": "a device with machines of several hosts",
     "F5106": "a device that another program commands",
+    "F5107": "machines that nothing stops",
     # F6: evidence
     "F6001": "the evidence is damaged or malformed",
     "F6002": "the evidence does not show what it claims",

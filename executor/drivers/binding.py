@@ -84,6 +84,18 @@ class AliveDocument(_Model):
     within_s: Seconds
 
 
+class NothingDocument(_Model):
+    """An empty mapping, which says that there is none."""
+
+
+Heartbeat = Annotated[
+    HeartbeatDocument | None,
+    BeforeValidator(
+        lambda value: None if value == {} else given(value), json_schema_input_type=HeartbeatDocument | NothingDocument
+    ),
+]
+
+
 class ChannelDocument(_Model):
     """Where the commands of one machine go, and where it shows the numbers of what it has taken, done or failed at.
 
@@ -118,7 +130,7 @@ class DeviceDocument(_Model):
     driver: Name
     channels: dict[Name, ChannelDocument] = {}
     safe: dict[Name, Writing] = {}
-    heartbeat: HeartbeatDocument | None = None
+    heartbeat: Heartbeat = None
     alive: AliveDocument | None = None
     timeout_s: Seconds = 1.0
     start_s: Seconds = 5.0

@@ -409,7 +409,7 @@ def test_the_report_of_machines_that_are_not_as_they_are_modelled_is_as_its_sche
         Conduct(watch=Watch.STOP),
     )
     monkeypatch.setattr(running, "run_bound", lambda *_, **__: ended)
-    monkeypatch.setattr(bound_run, "binding_of", lambda _: None)
+    monkeypatch.setattr(bound_run, "binding_for", lambda *_: (None, ()))
     report = run_bound_of(bundle, read_bundle(bundle), "b", Conduct(watch=Watch.STOP), None).to_json()
     schema = json.loads(files("firable.cli").joinpath("report.schema.json").read_text(encoding="utf-8"))
     bound = {

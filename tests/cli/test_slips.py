@@ -69,7 +69,6 @@ def of_layers() -> object:
     return Net("n", controllers=(Controller("line", coordinator=True), Controller("cell", under="lien")))
 
 
-CONTACT = "emergency_stop: {door: {device: modbus, read: discrete 3, controllers: [robto]}}\nsignals:\n"
 SLIPS: dict[str, tuple[Callable[[], object], str]] = {
     "an end of an arc of PNML": (lambda: parse_pnml(PNML), "buffer"),
     "a controller that gets a place": (lambda: edits.add_place(Source("c.yaml", BARE), "x", "robto"), "robot"),
@@ -86,7 +85,7 @@ SLIPS: dict[str, tuple[Callable[[], object], str]] = {
         "modbus",
     ),
     "a channel": (lambda: of_the_binding("channel: CV2", "channel: CV"), "CV2"),
-    "a controller of a contact": (lambda: of_the_binding("signals:\n", CONTACT), "robot"),
+    "a controller of a contact": (lambda: of_the_binding("discrete 9", "discrete 9, controllers: [robto]"), "robot"),
     "a controller that a resource opens to": (
         lambda: of_the_conceptual_net("to: robot.free", "to: robto.free"),
         "robot",
