@@ -26,7 +26,7 @@ from firable.executor.drivers.device import (
     quiet,
 )
 from firable.executor.drivers.modbus_connection import ModbusConnection
-from firable.executor.drivers.modbus_points import BITS, REGISTER_MAX, REGISTER_MIN, WRITTEN, address
+from firable.executor.drivers.modbus_points import BITS, REGISTER_MAX, REGISTER_MIN, WRITTEN, address, counted_from_one
 from firable.executor.reasons import is_in_use, port_reason
 
 if TYPE_CHECKING:
@@ -37,7 +37,24 @@ if TYPE_CHECKING:
     from firable.executor.drivers.modbus_connection import Client
 
 
-class TcpOptions(Options):
+class _ModbusOptions(Options):
+    """What both kinds have in common."""
+
+    addresses: Literal["wire"] | None = None
+
+    def point_problem(self, point: Point) -> str:
+        """A number that may be the address, or that of a manual, where the binding does not say which is meant."""
+        found = address(point)
+        counted = counted_from_one(str(found.number))
+        if self.addresses is not None or counted.partition(" ")[0] != found.table:
+            return ""
+        return (
+            f"in a manual {found.number} is mostly `{counted}`, counted from 1, with its table before it: write that, "
+            "or `addresses: wire` at the device if its numbers are the addresses themselves"
+        )
+
+
+class TcpOptions(_ModbusOptions):
     """A device in a network."""
 
     host: HostName
@@ -55,7 +72,7 @@ class TcpOptions(Options):
         return one_name(self.host), self.port, self.unit
 
 
-class RtuOptions(Options):
+class RtuOptions(_ModbusOptions):
     """A device on a serial line."""
 
     port: LinePath

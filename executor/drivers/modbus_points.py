@@ -4,6 +4,10 @@ Points are `coil N`, `discrete N`, `input N` and `holding N`, with addresses fro
 `holding N.B` or `input N.B` for a bit of a register, from 0. A number has one spelling, so that points can be compared
 as they are written: `holding 010` would be the register of `holding 10`, and look like another.
 
+Manuals number by the table as well, and from 1: 40012 is `holding 11`. That is told of a number without a table; and
+since a device may have so high an address, too, `holding 40012` is refused where the binding does not say which is
+meant. Rejected: to take either for it, which is another register for whoever means the other.
+
 Those next to each other go into one request, never with a gap, because a device may refuse what is not there.
 """
 
@@ -25,6 +29,8 @@ ADDRESS_MAX: Final = 65_535
 BIT_MAX: Final = 15
 REGISTER_MIN: Final = -(1 << 15)
 REGISTER_MAX: Final = (1 << 16) - 1
+_NUMBERED: Final = {"0": "coil", "1": "discrete", "3": "input", "4": "holding"}
+_OF_A_MANUAL: Final = re.compile(r"(?P<table>[0134])x?(?P<number>[0-9]{4,5})")
 AT_ONCE_MAX: Final = {"coil": 1968, "discrete": 2000, "input": 125, "holding": 123}
 """How many a request may carry, by the standard."""
 
@@ -48,8 +54,10 @@ def address(point: Point) -> Address:
     table, _, rest = point.partition(" ")
     number, dot, bit = rest.partition(".")
     if table not in TABLES or (at := _number(number, ADDRESS_MAX)) is None:
+        counted = counted_from_one(point.removeprefix(f"{table} ") if table in TABLES else point)
         raise ValueError(
             "it is not `coil N`, `discrete N`, `input N` or `holding N`, with N from 0 to 65535, without a 0 before it"
+            f"{f'; counted from 1, with its table before it, as manuals do, it is `{counted}`' if counted else ''}"
         )
     if not dot:
         return Address(table, at)
@@ -58,6 +66,17 @@ def address(point: Point) -> Address:
             "only a register has bits, `holding N.B` or `input N.B`, with B from 0 to 15, without a 0 before it"
         )
     return Address(table, at, bit_at)
+
+
+def counted_from_one(number: str) -> Point:
+    """The point that a number of a manual is, such as 40012 or 4x0012; empty where it is none.
+
+    >>> counted_from_one("40012"), counted_from_one("4x0012"), counted_from_one("300001"), counted_from_one("40000")
+    ('holding 11', 'holding 11', 'input 0', '')
+    """
+    found = _OF_A_MANUAL.fullmatch(number)
+    at = int(found["number"]) - 1 if found is not None else -1
+    return f"{_NUMBERED[found['table']]} {at}" if found is not None and 0 <= at <= ADDRESS_MAX else ""
 
 
 def _number(text: str, most: int) -> int | None:
