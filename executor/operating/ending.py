@@ -53,7 +53,8 @@ def _situation(run: Host) -> Situation:
     waits = run.peers.waits(is_over=run.stopping)
     others = "; ".join(sentence for sentence in waits if run.taking_up is None or "is held" not in sentence)
     if run.is_whole:
-        waiting = tuple(blocked(run.recorder.player, run.recorder.word, run.dispatch.untaken))
+        unread = frozenset(name for controller in run.controllers.values() for name in controller.unread)
+        waiting = tuple(blocked(run.recorder.player, run.recorder.word, run.dispatch.untaken, unread))
     else:
         waiting = tuple(_unready(run, one) for one in blocked_here(run.controllers.values(), run.dispatch.untaken))
     barred = beginnings(run.net) if run.ends_at_home else ()

@@ -54,6 +54,8 @@ class Blocked:
     """The coordinator of a transition of which only a part is seen."""
     unready: tuple[str, ...] = ()
     """Where that is here, the controllers elsewhere that have not reported their parts as ready."""
+    unread: tuple[str, ...] = ()
+    """Sensors that nobody has read since the start, so that their gates are closed whatever they show."""
     is_barred: bool = False
     """Whether the operator, who ends the cycle, lets it fire no more."""
 
@@ -63,6 +65,7 @@ class Blocked:
         reasons = [f"a token on {place}" for place in self.empty]
         reasons += [f"{place} to become empty" for place in self.full]
         reasons += [f"{signal}" if wanted else f"not {signal}" for signal, wanted in self.gates]
+        reasons += [f"{sensor} to be read" for sensor in self.unread]
         reasons += [f"the machine to take the command of {place}" for place in self.untaken]
         if not reasons and self.unready:
             return f"{self.transition} is ready here, and waits for {', '.join(self.unready)} to be ready"
@@ -109,26 +112,30 @@ def deadlocked(net: Net, marking: Marking) -> str:
     return f"no transition can fire any more, whatever the signals do{around}"
 
 
-def blocked(player: TokenPlayer, word: Word, untaken: Collection[str] = ()) -> Iterator[Blocked]:
+def blocked(
+    player: TokenPlayer, word: Word, untaken: Collection[str] = (), unread: Collection[str] = ()
+) -> Iterator[Blocked]:
     """What waits: the firable transitions with closed gates; in a deadlock, those that have some token to take.
 
-    `untaken` are the places whose command is held back with its driver.
+    `untaken` are the places whose command is held back with its driver, `unread` the sensors that nobody has read yet.
     """
     net = player.net
     faults = {net.transitions[t].name for t in net.fault_transitions.values()}  # nobody waits for a timeout
     firable = [c for c in player.transitions.values() if c.name not in faults and c.firable(word, player.places)]
     shown = firable or [c for c in player.transitions.values() if c.takes & word]
     for compiled in shown:
+        external = net.transition(compiled.name).external
         yield Blocked(
             compiled.name,
             net.names(compiled.needs & ~word & player.places),
             net.names(compiled.forbids & word & player.places),
             tuple(
                 (gate.signal, gate.wanted)
-                for gate in net.transition(compiled.name).external
-                if bool(word & player.signal_bit(gate.signal)) != gate.wanted
+                for gate in external
+                if gate.signal not in unread and bool(word & player.signal_bit(gate.signal)) != gate.wanted
             ),
             tuple(place for place in net.transition(compiled.name).inputs if place in untaken),
+            unread=tuple(dict.fromkeys(gate.signal for gate in external if gate.signal in unread)),
         )
 
 
@@ -136,7 +143,7 @@ def blocked_parts(controller: LocalController, untaken: Collection[str]) -> Iter
     """The same of one controller, as far as it knows: a part of a coordinated transition bears its name."""
     row_of = {part.name: row for row, part in controller.parts.items()}
     decided_by = {row: above.name for above in controller.above.values() for row in above.parts}
-    for one in blocked(controller.player, controller.word, untaken):
+    for one in blocked(controller.player, controller.word, untaken, controller.unread):
         row = row_of.get(one.transition, one.transition)
         yield replace(one, transition=row, decided_by=decided_by.get(row))
 
@@ -145,12 +152,13 @@ def blocked_here(controllers: Iterable[LocalController], untaken: Collection[str
     """The same of several controllers of one host: the parts of a transition that are here wait as one."""
     found: dict[str, Blocked] = {}
     for one in (each for controller in controllers for each in blocked_parts(controller, untaken)):
-        had = found.get(one.transition, replace(one, empty=(), full=(), gates=(), untaken=()))
+        had = found.get(one.transition, replace(one, empty=(), full=(), gates=(), untaken=(), unread=()))
         found[one.transition] = replace(
             had,
             empty=had.empty + one.empty,
             full=had.full + one.full,
             gates=had.gates + one.gates,
             untaken=had.untaken + one.untaken,
+            unread=had.unread + one.unread,
         )
     return tuple(found.values())

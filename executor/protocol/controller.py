@@ -316,6 +316,12 @@ class LocalController:
         self.word &= ~sum(bit for name in self.timers.signals if not (bit := self.player.signal_bit(name)) & held)
         self.await_sensors()
 
+    @property
+    def unread(self) -> frozenset[str]:
+        """The sensors that nobody has read since the start."""
+        bits = self.player.signal_bits if self.untold else {}
+        return frozenset(name for name, bit in bits.items() if bit & self.untold)
+
     def await_sensors(self) -> None:
         """Close the gates of each sensor until it is told: what nobody has read yet is no 0."""
         sensors = (s.name for s in self.subnet.signals if s.kind is SignalKind.SENSOR)

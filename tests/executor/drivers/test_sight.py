@@ -101,6 +101,26 @@ async def ended(host: Host, ending: asyncio.Task[Situation]) -> None:
 
 
 @pytest.mark.parametrize("net", [ALONE, TOGETHER], ids=["alone", "voted"])
+def test_a_situation_says_which_sensors_are_not_read_yet(net: Net) -> None:
+    async def main() -> None:
+        rig = Rig(net)
+        host = rig.host()
+        ending = asyncio.create_task(host.main())
+        await host.quiet()
+        assert told(host) == ["go waits for a.someone to be read", "turn waits for a.key to be read"]
+        rig.far.values["someone"] = 1
+        await rig.connect()
+        await rig.seen(host, value=True)
+        assert told(host) == ["go waits for not a.someone", "turn waits for a.key to be read"]
+        await ended(host, ending)
+
+    def told(host: Host) -> list[str]:
+        return [str(one) for one in host.situation().blocked]
+
+    asyncio.run(main())
+
+
+@pytest.mark.parametrize("net", [ALONE, TOGETHER], ids=["alone", "voted"])
 def test_nothing_fires_on_a_signal_that_was_not_read(net: Net) -> None:
     async def main() -> None:
         rig = Rig(net)
