@@ -14,6 +14,11 @@ from firable.decompose.splitting.cut import split
 from firable.decompose.verification.happenings import Plant as Reading
 from firable.decompose.verification.same_loop import compare
 from firable.executor.cell.plant import Plant, SensorChanged
+from firable.executor.drivers.bench import until
+from firable.executor.drivers.binding import parse_binding
+from firable.executor.drivers.far_side.cell import CellServer
+from firable.executor.drivers.far_side.ends import binding_text, ends_of
+from firable.executor.drivers.far_side.ports import free_port
 from firable.executor.operating.conduct import Conduct, Watch
 from firable.executor.operating.host import Host
 from firable.executor.operating.monitor import Monitor
@@ -338,3 +343,30 @@ def test_it_is_no_completion_for_nobody_outside_knows_of_commands() -> None:
 def test_its_times_are_no_matter_of_a_proof_and_who_sets_it_is() -> None:
     assert not otherwise_than(plant(), plant("{set_by: operator, after_s: 9}"))
     assert otherwise_than(plant(), plant("{acknowledges: P, after_s: 2}"))
+
+
+def test_a_served_cell_tells_of_what_is_set_again_and_again_once_for_all() -> None:
+    said: list[str] = []
+
+    async def main() -> None:
+        binding = parse_binding(binding_text(net(), {"modbus": str(free_port())}, plant().sensors))
+        cell = CellServer(
+            binding,
+            net(),
+            Plant(plant(), workpieces=0, seed=0),
+            ends_of(binding),
+            speed=200.0,
+            tell=lambda _, what: said.append(what),
+        )
+        await cell.start()
+        serving = asyncio.create_task(cell.run())
+        await until(lambda: sum(edge > 6 for edge in cell.edges.values()) == 2, "key and door, set again and again")
+        serving.cancel()
+        await asyncio.gather(serving, return_exceptions=True)
+        await cell.stop()
+
+    asyncio.run(main())
+    for name, seconds in (("key", (1, 2)), ("door", (2, 7))):
+        of_it = [what.removeprefix(f"press.{name} ") for what in said if what.startswith(f"press.{name} ")]
+        so = f"goes on so, 1 for {seconds[0]} s and 0 for {seconds[1]} s, and is told no more"
+        assert of_it == ["shows 1", "shows 0", so]

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -29,6 +30,9 @@ BEATS_MISSED: Final = 5
 
 SIGNS: Final = 4
 """How often a sign of life changes in the time within which it must."""
+
+_TURNS_TOLD: Final = 2
+"""How often a sensor that is set again and again is told to change."""
 
 
 @dataclass
@@ -88,6 +92,8 @@ class CellServer:
         """What each machine is at."""
         self.edges = dict.fromkeys(binding.document.signals, -1)
         """How often each signal has changed, since it was first shown."""
+        self.changes = Counter[str]()
+        """How often each sensor has changed."""
         self.next_ticket = 0
         self.begun_seconds = 0.0
         self.delivered = self.befallen = 0
@@ -237,7 +243,7 @@ class CellServer:
         for report in reports:
             match report:
                 case SensorChanged(signal, value):
-                    self.tell(self.now_seconds(), f"{signal} shows {int(value)}")
+                    self._tell_shown(signal, value=value)
                     self._sensor(signal)
                 case CommandDone(ticket):
                     if (waiting := self.tickets.pop(ticket, None)) is not None:
@@ -256,6 +262,16 @@ class CellServer:
         if len(self.plant.delivered) > self.delivered:
             self.delivered = len(self.plant.delivered)
             self.tell(self.now_seconds(), f"workpiece {self.plant.delivered[-1].id} is carried out")
+
+    def _tell_shown(self, signal: str, *, value: bool) -> None:
+        """Tell what a sensor shows; one that is set again and again hides all else, and is told of once for all."""
+        sensor = self.plant.model.sensors[signal]
+        self.changes[signal] += 1
+        if sensor.for_s is None or self.changes[signal] <= _TURNS_TOLD:
+            self.tell(self.now_seconds(), f"{signal} shows {int(value)}")
+        elif self.changes[signal] == _TURNS_TOLD + 1:
+            turns = f"1 for {sensor.for_s:g} s and 0 for {sensor.after_s:g} s"
+            self.tell(self.now_seconds(), f"{signal} goes on so, {turns}, and is told no more")
 
     def _sensor(self, signal: str) -> None:
         bound = self.binding.document.signals.get(signal)
