@@ -180,7 +180,8 @@ def machines_stopped(space: StateSpace[Any]) -> Verdict:
         machine, name, sending = found[0]
         others = listed(f"{machine} {name}" for machine, name, _ in found)
         hint = (
-            f"after {others} no other command is ever sent: make sure that the machine stops by itself, or add a stop"
+            f"after {others} no other command is ever sent, and what it has begun does not end with the token: "
+            "send one that ends it, a stop or the off of a lamp, or make sure that it ends by itself"
         )
         subjects = tuple(net.places[p].name for _, _, sending in found for p in sending)
         witness = space.witness(_sources(space, sending), f"the next firing can send {machine} {name}")
