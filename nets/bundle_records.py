@@ -14,11 +14,8 @@ from pydantic import BaseModel, ConfigDict
 
 from firable.nets.decomposition import ArbitrationGroup, Coordinated, Decomposition, Part
 from firable.nets.net import ArbitrationRule
+from firable.nets.records import Named, Record, Row
 from firable.nets.verdict import Cost, Cure, Status, Verdict, Wait, Weight, Witness
-
-
-class _Record(BaseModel):
-    model_config = ConfigDict(defer_build=True, extra="forbid", strict=True, frozen=True)
 
 
 class VersionRecord(BaseModel):
@@ -29,38 +26,38 @@ class VersionRecord(BaseModel):
     firable_bundle: int
 
 
-class ManifestRecord(_Record):
+class ManifestRecord(Record):
     """`manifest.json`: the SHA-256 of every other file, and a digest over the manifest itself."""
 
     firable_bundle: int
     cell: str
-    members: dict[str, str]
+    members: Named[str]
     digest: str
 
 
-class _CoordinatedRecord(_Record):
+class _CoordinatedRecord(Record):
     name: str
     number: int | None
-    parts: tuple[tuple[str, str], ...]
+    parts: Row[tuple[str, str]]
     description: str
     at: str | None
 
 
-class _GroupRecord(_Record):
+class _GroupRecord(Record):
     name: str
-    sequence: tuple[str, ...]
-    rest: tuple[str, ...]
+    sequence: Row[str]
+    rest: Row[str]
     by: ArbitrationRule
     controller: str | None
     at: str | None
 
 
-class TableRecord(_Record):
+class TableRecord(Record):
     """`table.json`: what the coordinator decides."""
 
-    coordinated: tuple[_CoordinatedRecord, ...]
-    groups: tuple[_GroupRecord, ...]
-    free: tuple[tuple[str, str], ...] = ()
+    coordinated: Row[_CoordinatedRecord]
+    groups: Row[_GroupRecord]
+    free: Row[tuple[str, str]] = ()
 
     def rows(self) -> tuple[Coordinated, ...]:
         """The transitions that the coordinator decides."""
@@ -105,26 +102,26 @@ def table_to_json(decomposition: Decomposition) -> dict[str, Any]:
     }
 
 
-class _WaitRecord(_Record):
+class _WaitRecord(Record):
     place: str
     transition: str
     lacks: str
     wanted: bool
     holder: str
-    by: tuple[str, ...]
+    by: Row[str]
 
     def wait(self) -> Wait:
         """The wait."""
         return Wait(self.place, self.transition, self.lacks, self.wanted, self.holder, self.by)
 
 
-class _WitnessRecord(_Record):
-    firings: tuple[tuple[str, ...], ...]
-    cycle: tuple[tuple[str, ...], ...]
-    marking: tuple[str, ...]
-    assignment: tuple[tuple[str, bool], ...]
+class _WitnessRecord(Record):
+    firings: Row[Row[str]]
+    cycle: Row[Row[str]]
+    marking: Row[str]
+    assignment: Row[tuple[str, bool]]
     note: str
-    waits: tuple[_WaitRecord, ...] = ()
+    waits: Row[_WaitRecord] = ()
 
     def witness(self) -> Witness:
         """The witness."""
@@ -132,10 +129,10 @@ class _WitnessRecord(_Record):
         return Witness(self.firings, self.cycle, self.marking, self.assignment, self.note, waits)
 
 
-class _CureRecord(_Record):
-    changes: tuple[str, ...]
-    proves: tuple[str, ...]
-    loses: tuple[str, ...]
+class _CureRecord(Record):
+    changes: Row[str]
+    proves: Row[str]
+    loses: Row[str]
     markings: int
 
     def cure(self) -> Cure:
@@ -143,7 +140,7 @@ class _CureRecord(_Record):
         return Cure(self.changes, self.proves, self.loses, self.markings)
 
 
-class VerdictRecord(_Record):
+class VerdictRecord(Record):
     """What `Verdict.to_json` writes."""
 
     name: str
@@ -154,13 +151,13 @@ class VerdictRecord(_Record):
     code: str = ""
     hint: str = ""
     bound: str = ""
-    subjects: tuple[str, ...] = ()
+    subjects: Row[str] = ()
     witness: _WitnessRecord | None = None
-    evidence: tuple[str, ...] = ()
+    evidence: Row[str] = ()
     markings: int | None = None
     edges: int | None = None
     discipline: str = ""
-    cures: tuple[_CureRecord, ...] = ()
+    cures: Row[_CureRecord] = ()
 
     def verdict(self) -> Verdict:
         """The verdict."""
@@ -182,11 +179,11 @@ class VerdictRecord(_Record):
         )
 
 
-class JudgedRecord(_Record):
+class JudgedRecord(Record):
     """`verdicts.json`: the verdicts, and the SHA-256 of each file that they are about."""
 
-    of: dict[str, str]
-    verdicts: tuple[VerdictRecord, ...]
+    of: Named[str]
+    verdicts: Row[VerdictRecord]
 
     def read(self) -> tuple[Verdict, ...]:
         """The verdicts."""

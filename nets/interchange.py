@@ -16,9 +16,9 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from typing import Annotated, Any, Final, Literal, TypeVar
+from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, FailFast, ValidationError
+from pydantic import BeforeValidator, Field, ValidationError
 
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.formula import Formula, FormulaError, format_formula, parse_formula
@@ -41,16 +41,12 @@ from firable.nets.net import (
     TimeLimit,
     Transition,
 )
+from firable.nets.records import Many, Named, Record
 from firable.nets.temporal import Logic, format_temporal, logics, parse_temporal
 from firable.nets.verdict import Expectation, Status
 
 FORMAT: Final = "firable-net/3"
 _ANEW: Final = f"write it anew with `net_to_json`, or make the bundle or the evidence anew: the form is {FORMAT}"
-
-
-T = TypeVar("T")
-Many = Annotated[list[T], FailFast()]
-"""A list, read as far as its first wrong item: an error for each of very many takes some hundred times their memory."""
 
 
 def net_to_json(net: Net) -> dict[str, Any]:
@@ -255,11 +251,7 @@ def _no_formula(name: str, error: FormulaError) -> InputError:
     return InputError([Diagnostic("F1012", message, _ANEW, ("properties", name))])
 
 
-class _Record(BaseModel):
-    model_config = ConfigDict(defer_build=True, extra="forbid", strict=True, frozen=True)
-
-
-class _ControllerRecord(_Record):
+class _ControllerRecord(Record):
     name: str
     coordinator: bool
     description: str
@@ -269,30 +261,30 @@ class _ControllerRecord(_Record):
 _Pairs = Many[Annotated[tuple[str, str], BeforeValidator(lambda v: tuple(v) if isinstance(v, list) else v)]]
 
 
-class _CommandRecord(_Record):
+class _CommandRecord(Record):
     machine: str
     command: str
     parameters: _Pairs
 
 
-class _TaskUseRecord(_Record):
+class _TaskUseRecord(Record):
     name: str
     arguments: _Pairs
 
 
-class _ResourceRecord(_Record):
+class _ResourceRecord(Record):
     idle: str
     machine: str
     prefix: str
     parameters: _Pairs
 
 
-class _TimeLimitRecord(_Record):
+class _TimeLimitRecord(Record):
     milliseconds: int
     timer: str
 
 
-class _PlaceRecord(_Record):
+class _PlaceRecord(Record):
     name: str
     owner: str | None
     marked: bool
@@ -304,18 +296,18 @@ class _PlaceRecord(_Record):
     within: _TimeLimitRecord | None
 
 
-class _SignalRecord(_Record):
+class _SignalRecord(Record):
     name: str
     owner: str | None
     kind: Literal["completion", "sensor", "timer"]
 
 
-class _GateRecord(_Record):
+class _GateRecord(Record):
     signal: str
     wanted: bool
 
 
-class _TransitionRecord(_Record):
+class _TransitionRecord(Record):
     name: str
     inputs: Many[str]
     outputs: Many[str]
@@ -326,13 +318,13 @@ class _TransitionRecord(_Record):
     description: str
 
 
-class _ArbiterRecord(_Record):
+class _ArbiterRecord(Record):
     name: str
     among: Many[str]
     by: Literal["priority", "order", "rotation"]
 
 
-class _PropertyRecord(_Record):
+class _PropertyRecord(Record):
     name: str
     kind: Literal["never", "always", "reachable", "leads_to", "always_possible", "ctl", "ltl"]
     formula: str
@@ -340,7 +332,7 @@ class _PropertyRecord(_Record):
     fairness: Literal["none", "weak", "strong"]
 
 
-class _NetRecord(_Record):
+class _NetRecord(Record):
     format: Literal["firable-net/3"]
     name: str
     description: str
@@ -350,4 +342,4 @@ class _NetRecord(_Record):
     transitions: Many[_TransitionRecord]
     arbiters: Many[_ArbiterRecord]
     properties: Many[_PropertyRecord]
-    expected: dict[str, Literal["proved", "violated"]] = {}
+    expected: Named[Literal["proved", "violated"]] = Field(default_factory=dict)

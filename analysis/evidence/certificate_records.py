@@ -37,10 +37,10 @@ from firable.analysis.evidence.certificate import (
     Unfolded,
     Whole,
 )
-from firable.analysis.evidence.claim_records import Data, Hexadecimal, Natural, Sets, known
+from firable.analysis.evidence.claim_records import Hexadecimal, Natural, Sets, known
 from firable.nets.formula import format_formula, parse_formula
-from firable.nets.interchange import Many
 from firable.nets.net import Net
+from firable.nets.records import Many, Named, Record
 
 DEPTH_MAX: Final = 1_000
 ROUNDS_MAX: Final = 1_000_000
@@ -50,7 +50,7 @@ _NUMBER_MAX: Final = 10**_DIGITS_MAX
 Firings = Many[Many[str]]
 
 
-class _FiringSequenceRecord(Data):
+class _FiringSequenceRecord(Record):
     kind: Literal["firing-sequence"]
     firings: Firings
     cycle: Firings = Field(default_factory=list)
@@ -60,17 +60,17 @@ class _FiringSequenceRecord(Data):
         return FiringSequence(_firings(net, self.firings), _firings(net, self.cycle))
 
 
-class _SumRecord(Data):
-    weights: dict[str, int]
+class _SumRecord(Record):
+    weights: Named[int]
     tokens: int
 
 
-class _ClauseRecord(Data):
+class _ClauseRecord(Record):
     marked: Many[str]
     empty: Many[str]
 
 
-class _InvariantRecord(Data):
+class _InvariantRecord(Record):
     kind: Literal["inductive-invariant"]
     equations: Many[_SumRecord]
     inequalities: Many[_SumRecord]
@@ -91,7 +91,7 @@ class _InvariantRecord(Data):
         )
 
 
-class _RanksRecord(Data):
+class _RanksRecord(Record):
     kind: Literal["ranks"]
     ranks: Many[Annotated[int, Field(ge=-1)]]
 
@@ -99,7 +99,7 @@ class _RanksRecord(Data):
         return Ranks(tuple(self.ranks))
 
 
-class _BackRecord(Data):
+class _BackRecord(Record):
     kind: Literal["back"]
     transitions: Many[str]
 
@@ -107,7 +107,7 @@ class _BackRecord(Data):
         return Back(tuple(known(name, net.transition_index) for name in self.transitions))
 
 
-class _RoundsRecord(Data):
+class _RoundsRecord(Record):
     kind: Literal["rounds"]
     rounds: Annotated[int, Field(ge=0, le=ROUNDS_MAX)]
 
@@ -115,7 +115,7 @@ class _RoundsRecord(Data):
         return Rounds(self.rounds)
 
 
-class _RootRecord(Data):
+class _RootRecord(Record):
     kind: Literal["root"]
     root: Natural
 
@@ -123,7 +123,7 @@ class _RootRecord(Data):
         return Root(self.root)
 
 
-class _WholeRecord(Data):
+class _WholeRecord(Record):
     kind: Literal["whole"]
 
     def of(self, _: Net) -> Whole:
@@ -135,7 +135,7 @@ _LabelRecord = Annotated[
 ]
 
 
-class _LabellingRecord(Data):
+class _LabellingRecord(Record):
     kind: Literal["labelling"]
     set: Natural
     labels: Many[_LabelRecord]
@@ -144,7 +144,7 @@ class _LabellingRecord(Data):
         return Labelling(_set(sets, self.set), tuple(label.of(net) for label in self.labels))
 
 
-class _StubbornRecord(Data):
+class _StubbornRecord(Record):
     kind: Literal["stubborn-sets"]
     set: Natural
     stubborn: Many[Hexadecimal]
@@ -157,7 +157,7 @@ class _StubbornRecord(Data):
         return StubbornSets(_listed(sets, self.set), stubborn, tuple(self.chosen))
 
 
-class _StepRecord(Data):
+class _StepRecord(Record):
     rule: str
     moves: Many[Natural] = Field(default_factory=list)
     places: Many[str] = Field(default_factory=list)
@@ -166,7 +166,7 @@ class _StepRecord(Data):
         return Step(Rule(self.rule), tuple(self.moves), _places(net, self.places))
 
 
-class _ReductionRecord(Data):
+class _ReductionRecord(Record):
     kind: Literal["reduction"]
     steps: Many[_StepRecord]
     part: Many[str]
@@ -184,7 +184,7 @@ _NeverRecord = Annotated[
 ]
 
 
-class _ContinuationRecord(Data):
+class _ContinuationRecord(Record):
     kind: Literal["continuation"]
     firings: Firings
     then: _NeverRecord
@@ -193,7 +193,7 @@ class _ContinuationRecord(Data):
         return Continuation(_firings(net, self.firings), self.then.of(net, sets))
 
 
-class _ProgressRecord(Data):
+class _ProgressRecord(Record):
     kind: Literal["progress"]
     set: Natural
     ranks: Many[Many[Natural]]
@@ -206,7 +206,7 @@ class _ProgressRecord(Data):
         return Progress(_listed(sets, self.set), tuple(map(tuple, self.ranks)), helpful)
 
 
-class _TheoremRecord(Data):
+class _TheoremRecord(Record):
     kind: Literal["theorem"]
     name: Literal["marked-graph", "free-choice", "asymmetric-choice"]
     contact: _NeverRecord
@@ -217,7 +217,7 @@ class _TheoremRecord(Data):
         return Theorem(TheoremName(self.name), self.contact.of(net, sets), traps)
 
 
-class _UnfoldedRecord(Data):
+class _UnfoldedRecord(Record):
     kind: Literal["unfolded"]
     set: Natural
 

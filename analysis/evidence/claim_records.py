@@ -10,13 +10,13 @@ from dataclasses import dataclass, field
 from itertools import accumulate, pairwise
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from firable.analysis.evidence.certificate import Diagram, Markings
 from firable.analysis.evidence.claims import STATE_GOALS, TRUE, Claim, ClaimKind
 from firable.nets.formula import Formula, Holds, format_formula, parse_formula
-from firable.nets.interchange import Many
 from firable.nets.net import Fairness, Marking, Net
+from firable.nets.records import Many, Record
 from firable.nets.temporal import Logic, Temporal, format_temporal, logics, parse_temporal
 from firable.nets.temporal_parts import atoms_in
 
@@ -33,20 +33,14 @@ APART_MAX: Final = 100_000
 """How many markings of a set are written each for itself; of more the steps between them, which are shorter."""
 
 
-class Data(BaseModel):
-    """Data of one shape; whatever else stands there is refused."""
-
-    model_config = ConfigDict(defer_build=True, extra="forbid", strict=True, frozen=True)
-
-
-class ClaimRecord(Data):
+class ClaimRecord(Record):
     """A claim; what a kind of claim does not speak of is left out."""
 
     kind: Annotated[ClaimKind, Field(strict=False)]  # not strict: an enumeration is a string here
     goal: str
     then: str = ""
     fairness: Annotated[Fairness, Field(strict=False)] = Fairness.NONE
-    fires: Many[str] = []
+    fires: Many[str] = Field(default_factory=list)
 
     def of(self, net: Net) -> Claim:
         """The claim, its names looked up; refused where it says what nobody would look at."""
@@ -89,7 +83,7 @@ def claim_to_json(claim: Claim) -> dict[str, Any]:
     return data
 
 
-class MarkingsRecord(Data):
+class MarkingsRecord(Record):
     """Listed markings."""
 
     kind: Literal["markings"]
@@ -105,7 +99,7 @@ class MarkingsRecord(Data):
         return Markings(markings)
 
 
-class AscendingRecord(Data):
+class AscendingRecord(Record):
     """Many listed markings: the smallest, and by how much each other one is larger than the one before it."""
 
     kind: Literal["ascending"]
@@ -122,7 +116,7 @@ class AscendingRecord(Data):
         return Markings(markings)
 
 
-class DiagramRecord(Data):
+class DiagramRecord(Record):
     """A decision diagram."""
 
     kind: Literal["diagram"]

@@ -215,7 +215,7 @@ def document_from_text(text: str, file: str = "") -> Document:
         raise _damaged(file, error.diagnostics[0].message) from None
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
-        raise _damaged(file, f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from None
+        raise _damaged(file, f"{'.'.join(map(str, first['loc'])) or 'the whole'}: {first['msg']}") from None
     except FormulaError as error:
         raise _damaged(file, f"a formula cannot be read: {error.message}") from None
     except (ValueError, RecursionError) as error:  # not JSON, or what is raised here

@@ -7,22 +7,22 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from firable.analysis.evidence.certificate_records import CertificateRecord
-from firable.analysis.evidence.claim_records import AscendingRecord, ClaimRecord, Data, DiagramRecord, MarkingsRecord
-from firable.nets.interchange import Many
+from firable.analysis.evidence.claim_records import AscendingRecord, ClaimRecord, DiagramRecord, MarkingsRecord
+from firable.nets.records import Many, Record
 
 
-class BeforeRecord(Data):
+class BeforeRecord(Record):
     """The certificate that an earlier verdict of the document has for the same claim."""
 
     kind: Literal["before"]
 
 
-class _ShownRecord(Data):
+class _ShownRecord(Record):
     claim: ClaimRecord
     certificate: CertificateRecord | BeforeRecord
 
 
-class _VerdictRecord(Data):
+class _VerdictRecord(Record):
     name: str
     status: Literal["proved", "violated"]
     query: str
@@ -30,7 +30,7 @@ class _VerdictRecord(Data):
     shown: Many[_ShownRecord]
 
 
-class EvidenceRecord(Data):
+class EvidenceRecord(Record):
     """The whole document."""
 
     firable_evidence: Annotated[int, Field(ge=2, le=2)]  # no Literal: 2.0 equals 2

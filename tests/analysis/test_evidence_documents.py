@@ -169,10 +169,10 @@ CHANGES: dict[str, tuple[str, Change, str]] = {
         "Input should be 'proved' or 'violated'",
     ),
     "another net's digest": ("weak", lambda data: data.update(digest="0" * 64), "the digest is not that of the net"),
-    "a key beside the others": ("weak", lambda data: data.update(note=""), "Extra inputs"),
+    "a key beside the others": ("weak", lambda data: data.update(note=""), "'note' is no key here"),
     "a negative rank": ("weak", of_certificate(ranks=[[-1], [0], [], []]), "greater than or equal to 0"),
-    "a key that is none": ("weak", of_certificate(note=""), "Extra inputs"),
-    "a key of a claim that is none": ("weak", of_claim(note=""), "Extra inputs"),
+    "a key that is none": ("weak", of_certificate(note=""), "'note' is no key here"),
+    "a key of a claim that is none": ("weak", of_claim(note=""), "'note' is no key here"),
     "an enumeration's other name": ("weak", of_claim(fairness="WEAK"), "weak"),
 }
 
