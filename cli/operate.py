@@ -284,7 +284,8 @@ async def _whole(answer: aiohttp.ClientResponse) -> bytes:
 
 
 def _told(answer: dict[str, Any]) -> str:
-    lines = [f"{answer['state']}: {answer['message']}" if answer["message"] else str(answer["state"])]
+    first, *more = str(answer["message"]).split("; ")  # a run that is held has a sentence for each command
+    lines = [f"{answer['state']}: {first}" if first else str(answer["state"]), *(f"  {one}" for one in more)]
     if "fired" in answer and not answer.get("refused"):
         lines.insert(0, f"fired {answer['fired']}" if answer["fired"] else "no transition has fired")
     lines[:0] = [f"refused: {why}" for why in answer.get("refused", ())]

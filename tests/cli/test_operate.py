@@ -120,6 +120,7 @@ def test_an_operator_resets_an_emergency_stop_says_what_a_machine_did_and_resume
     until_told(address, "latched", folder, capsys)
     assert operate(address, "reset", folder, capsys).startswith("held")
     told = until_told(address, "say what it did", folder, capsys)
+    assert "\n  look at the machine and say what it did" in told, "each sentence has a line of its own"
     places = re.findall(r"say (\S+)=done", told)
     assert places
     assert operate(address, "resume", folder, capsys, code=1).startswith("refused: the run is held")
