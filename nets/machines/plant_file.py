@@ -514,6 +514,14 @@ def _difference(one: Any, other: Any, path: Path) -> Path | None:
     return None if one == other else path
 
 
+_WORK: Final = "{does: work, takes_s: 1}"
+
+
+def _add(written: str) -> str:
+    """The hint on what a plant file lacks: what nobody looks for there, such as a lamp, is work like any other."""
+    return f"add it to the plant file, as `{written}` where it concerns no workpiece: a lamp, a door"
+
+
 def _misfits_of_places(model: PlantModel, net: Net) -> Iterator[Diagnostic]:
     for place in net.places:
         command, subject = place.command, ("places", place.name)
@@ -522,13 +530,14 @@ def _misfits_of_places(model: PlantModel, net: Net) -> Iterator[Diagnostic]:
         sent = f"'{place.name}' sends '{command}'"
         known = model.machines.get(command.machine)
         if known is None:
-            hint = did_you_mean(command.machine, list(model.machines)) + "add it to the plant file"
+            written = f"{command.machine}: {{commands: {{{command.command}: {_WORK}}}}}"
+            hint = did_you_mean(command.machine, list(model.machines)) + _add(written)
             message = f"{sent}, and the plant has no such machine '{command.machine}'"
             yield model.misfit(("machines",), subject, message, hint)
             continue
         inner = ("machines", command.machine, "commands", command.command)
         if command.command not in known.commands:
-            hint = did_you_mean(command.command, list(known.commands)) + "add it to the plant file"
+            hint = did_you_mean(command.command, list(known.commands)) + _add(f"{command.command}: {_WORK}")
             yield model.misfit(inner, subject, f"{sent}, and the plant has no such command '{command.command}'", hint)
             continue
         action, parameters = known.commands[command.command], dict(command.parameters)

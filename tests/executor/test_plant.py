@@ -376,8 +376,8 @@ def test_machine_or_command_that_the_plant_lacks_is_said_at_the_table_to_add_it_
     text = plant_path("one_robot").read_text("utf-8")
     net = catalogue_net("one_robot")
     for old, new, at, words in (
-        ("\n  MC:", "\n  MCC:", "machines", "did you mean 'MCC'? add it to the plant file"),
-        ("      MOVE:", "      MOVEE:", "commands", "did you mean 'MOVEE'? add it to the plant file"),
+        ("\n  MC:", "\n  MCC:", "machines", "did you mean 'MCC'? add it to the plant file, as `MC: {commands: {"),
+        ("      MOVE:", "      MOVEE:", "commands", "did you mean 'MOVEE'? add it to the plant file, as `MOVE: {does:"),
     ):
         assert old in text
         lacking = text.replace(old, new)
