@@ -40,6 +40,27 @@ tasks:
 """
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "hint"),
+    [
+        (
+            "unless: source.held",
+            "unless: not source.held",
+            "a gate is one name, and no condition: write `if: source.held`",
+        ),
+        ("if: robot.near", "if: robot.near and not source.held", "write `if: robot.near, unless: source.held`"),
+        ("[robot.take, source.held]", "'robot.take, source.held'", "write `from: [robot.take, source.held]`"),
+    ],
+)
+def test_a_list_or_a_condition_in_the_place_of_a_name_is_told_as_the_file_says_it(
+    old: str, new: str, hint: str
+) -> None:
+    assert old in TASK
+    with pytest.raises(InputError) as refused:
+        parse_tasks(TASK.replace(old, new))
+    assert hint in refused.value.diagnostics[0].hint
+
+
 def test_a_task_is_read_with_its_steps_moves_and_defaults() -> None:
     task = parse_tasks(TASK)["fetch"]
     assert [role.name for role in task.roles] == ["robot", "source"]
