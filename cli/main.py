@@ -45,9 +45,6 @@ EXTRAS = {
     "cvc5": ("verify", "the second solver; or ask the first one: --solver z3"),
 }
 
-FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
-"""The errors of a disk that takes no more."""
-
 COMMANDS = {
     "bundle": "bundle.bundle",
     "check": "check.check",
@@ -227,6 +224,7 @@ def _to_nowhere(stream: TextIO) -> None:
 
 def _ended_by(error: Exception, arguments: Sequence[str]) -> int:
     from firable.nets.diagnostics import Diagnostic, InputError
+    from firable.nets.writing import FULL
 
     match error:
         case click.exceptions.NoArgsIsHelpError():

@@ -298,7 +298,7 @@ def _token_kept(path: Path) -> str:
     """The token in a file, which is made with a new one if there is none."""
     from firable.executor.operating.control import new_token
     from firable.nets.secret_files import is_open_to_all
-    from firable.nets.writing import stands
+    from firable.nets.writing import stands, write_secret
 
     if stands(path):
         token = _token_read(path)
@@ -306,12 +306,7 @@ def _token_kept(path: Path) -> str:
             raise _open_to_all(path)
         return token
     token = new_token()
-    try:
-        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    except (OSError, ValueError) as error:
-        raise _file_refusal("F1017", path, error) from None
-    with os.fdopen(descriptor, "w", encoding="ascii") as stream:
-        stream.write(f"{token}\n")
+    write_secret(path, f"{token}\n".encode("ascii"))
     return token
 
 
@@ -320,11 +315,11 @@ def _token_read(path: Path) -> str:
         with path.open(encoding="ascii") as opened:
             token = opened.read(_TOKEN_CHARACTERS_MAX + 1).strip()
     except (OSError, ValueError) as error:
-        raise _file_refusal("F1001", path, error) from None
+        raise _file_refusal(path, error) from None
     if not token or not token.isprintable() or " " in token:
-        raise _file_refusal("F1001", path, ValueError("it is empty" if not token else "it is not one word in one line"))
+        raise _file_refusal(path, ValueError("it is empty" if not token else "it is not one word in one line"))
     if len(token) > _TOKEN_CHARACTERS_MAX:
-        raise _file_refusal("F1001", path, ValueError(f"it has more than {_TOKEN_CHARACTERS_MAX} characters"))
+        raise _file_refusal(path, ValueError(f"it has more than {_TOKEN_CHARACTERS_MAX} characters"))
     return token
 
 
@@ -336,11 +331,12 @@ def _open_to_all(path: Path) -> InputError:
     return InputError([Diagnostic("F5060", f"{name}: everybody on this host can read this token, or change it", hint)])
 
 
-def _file_refusal(code: str, path: Path, error: Exception) -> InputError:
+def _file_refusal(path: Path, error: Exception) -> InputError:
     from firable.nets.diagnostics import Diagnostic, InputError
 
     reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
-    return InputError([Diagnostic(code, f"{printable(str(path))}: no token: {reason}", "name the file of the token")])
+    message = f"{printable(str(path))}: no token: {reason}"
+    return InputError([Diagnostic("F1001", message, "name the file of the token")])
 
 
 def client_tls(ca: str | None, cert: tuple[str, str] | None) -> ssl.SSLContext:

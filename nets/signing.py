@@ -15,8 +15,8 @@ expiry, and an authority to be kept; a site trusts a handful of keys, and names 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -30,7 +30,7 @@ from firable.nets.diagnostics import Diagnostic, InputError, Span
 from firable.nets.interchange import canonical_json
 from firable.nets.secret_files import is_open_to_all
 from firable.nets.source import printable, read_bytes
-from firable.nets.writing import stands, write_whole
+from firable.nets.writing import stands, write_secret, write_whole
 
 SUFFIX: Final = ".signatures"
 _SIZE_BYTES_MAX: Final = 1 << 20
@@ -70,19 +70,16 @@ def make_key(path: str | Path) -> str:
         serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
     )
     public = key.public_key().public_bytes(serialization.Encoding.PEM, serialization.PublicFormat.SubjectPublicKeyInfo)
-    try:
-        for file in (path, public_path):
+    for file in (path, public_path):
+        if stands(file):
             if file.is_dir():
                 raise _refusal("F1017", file, "this is a directory", "name a file in it")
-            if file.exists():
-                raise _refusal("F1017", file, "a file stands there, and may be a key in use", "name another file")
-        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    except (OSError, ValueError) as error:
-        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
-        raise _refusal("F1017", path, f"cannot be written: {reason}", "name a file in a folder of yours") from None
-    with os.fdopen(descriptor, "wb") as stream:
-        stream.write(secret)
-    write_whole(public_path, public)
+            raise _refusal("F1017", file, "a file stands there, and may be a key in use", "name another file")
+    write_secret(path, secret)
+    with ExitStack() as undone:  # one half would keep the other from being made under this name
+        undone.callback(path.unlink)
+        write_whole(public_path, public)
+        undone.pop_all()
     return _name(key.public_key())
 
 

@@ -13,12 +13,15 @@ import errno
 import os
 import stat
 from collections.abc import Generator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.source import printable
+
+FULL: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
+"""The errors of a disk that takes no more."""
 
 
 def write_whole(path: str | Path, data: bytes | str) -> None:
@@ -47,6 +50,22 @@ def write_whole(path: str | Path, data: bytes | str) -> None:
         finally:  # nothing is left behind, whatever ended the writing
             with suppress(OSError, ValueError):
                 unfinished.unlink(missing_ok=True)
+
+
+def write_secret(path: str | Path, data: bytes) -> None:
+    """Write a new file that its owner alone may read: whole, or not at all; nothing that stands there is replaced.
+
+    Raises `InputError` F1017 where that fails for any reason, as where something stands there.
+    """
+    with _failures(path):
+        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+        with ExitStack() as undone:  # half a key is refused as a key, and would be taken for one in use
+            undone.callback(os.unlink, path)
+            with os.fdopen(descriptor, "wb") as stream:
+                stream.write(data)
+                stream.flush()
+                os.fsync(stream.fileno())
+            undone.pop_all()
 
 
 UNREAD: Final = "it is a pipe that nobody reads"
@@ -97,4 +116,6 @@ def _failures(path: str | Path) -> Generator[None]:
     except (OSError, ValueError) as error:  # ValueError: a path with a NUL in it, a text that is no Unicode
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
         message = f"{printable(str(path)) or 'no name'}: cannot be written: {reason}"
-        raise InputError([Diagnostic("F1017", message, "name a file in a folder that you may write to")]) from None
+        is_full = isinstance(error, OSError) and error.errno in FULL
+        hint = "make room on its disk" if is_full else "name a file in a folder that you may write to"
+        raise InputError([Diagnostic("F1017", message, hint)]) from None

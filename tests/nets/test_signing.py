@@ -1,6 +1,8 @@
 """Signatures of bundles: what a site that demands one refuses."""
 
+import errno
 import json
+import os
 import stat
 from pathlib import Path
 
@@ -157,3 +159,22 @@ def test_a_secret_key_is_its_owners_alone_and_never_overwritten(tmp_path: Path) 
     with pytest.raises(InputError, match="F1017"):  # its public half still stands there
         make_key(key)
     assert before
+
+
+@pytest.mark.parametrize("halves", [0, 1])
+def test_a_key_that_finds_no_room_leaves_no_half_of_it(
+    halves: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    room = iter(range(halves))
+
+    def sync(_descriptor: int) -> None:
+        if next(room, None) is None:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as disk:
+        disk.setattr(os, "fsync", sync)
+        with pytest.raises(InputError, match="No space left") as error:
+            make_key(tmp_path / "key")
+    assert "make room" in error.value.diagnostics[0].hint
+    assert not list(tmp_path.iterdir())
+    make_key(tmp_path / "key")

@@ -1,5 +1,6 @@
 """A file is written whole or not at all, and every failure is the one diagnostic F1017."""
 
+import errno
 import os
 import stat
 from pathlib import Path
@@ -7,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from firable.nets.diagnostics import InputError
-from firable.nets.writing import make_folder, write_whole
+from firable.nets.writing import make_folder, write_secret, write_whole
 
 
 def refused(path: Path | str, data: bytes | str = b"new") -> str:
@@ -105,3 +106,24 @@ def test_a_folder_is_made_with_those_around_it_or_refused(tmp_path: Path) -> Non
     for path in (tmp_path / "file", tmp_path / "file" / "x", tmp_path / "a\0b"):
         with pytest.raises(InputError, match="F1017"):
             make_folder(path)
+
+
+def test_a_secret_is_a_new_file_of_its_owner_alone(tmp_path: Path) -> None:
+    path = tmp_path / "secret"
+    write_secret(path, b"mine")
+    assert (path.read_bytes(), stat.S_IMODE(path.stat().st_mode)) == (b"mine", 0o600)
+    with pytest.raises(InputError, match=r"F1017.*File exists"):
+        write_secret(path, b"other")
+    assert path.read_bytes() == b"mine"
+
+
+def test_a_disk_without_room_is_told_as_one_and_keeps_no_part(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def sync(_descriptor: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", sync)
+    for write in (write_whole, write_secret):
+        with pytest.raises(InputError, match="No space left") as refusal:
+            write(tmp_path / "file", b"data")
+        assert refusal.value.diagnostics[0].hint == "make room on its disk"
+        assert not list(tmp_path.iterdir())
