@@ -140,7 +140,8 @@ def _record(at: Path) -> SignaturesRecord:
     try:
         return SignaturesRecord.model_validate_json(read_bytes(at, _SIZE_BYTES_MAX), strict=True)
     except ValidationError:
-        raise _refusal("F5024", at, "this is no file of signatures, or it is damaged", "sign the bundle anew") from None
+        hint = "remove it, and let all who have signed the bundle sign it anew"
+        raise _refusal("F5024", at, "this is no file of signatures, or it is damaged", hint) from None
 
 
 def _secret(path: str | Path) -> Ed25519PrivateKey:

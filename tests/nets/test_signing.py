@@ -123,8 +123,11 @@ def test_a_file_of_signatures_in_no_version_is_refused(bundle: Path, version: st
 def test_a_damaged_file_of_signatures_is_refused(bundle: Path, text: str) -> None:
     signatures_path(bundle).write_text(text)
     assert "F5024" in refused(bundle, "ours.pub")
-    with pytest.raises(InputError, match="F5024"):
+    with pytest.raises(InputError, match="F5024") as error:
         sign(read_bundle(bundle), bundle, bundle.with_name("ours"))
+    assert error.value.diagnostics[0].hint.startswith("remove it")
+    signatures_path(bundle).unlink()
+    sign(read_bundle(bundle), bundle, bundle.with_name("ours"))
 
 
 def test_what_is_no_key_is_refused(bundle: Path) -> None:
