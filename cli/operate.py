@@ -341,7 +341,7 @@ def _file_refusal(path: Path, error: Exception) -> InputError:
 
 def client_tls(ca: str | None, cert: tuple[str, str] | None) -> ssl.SSLContext:
     """The operator's side of TLS: whom he believes, and what he shows. Raises `InputError` F5062."""
-    from firable.executor.operating.own_certificate import fault_of, unloaded
+    from firable.executor.operating.own_certificate import fault_of, remedy_of, unloaded
     from firable.nets.diagnostics import Diagnostic, InputError
 
     what, files, hint = "the certificate of the authority", [ca] if ca else [], "name PEM files"
@@ -355,7 +355,7 @@ def client_tls(ca: str | None, cert: tuple[str, str] | None) -> ssl.SSLContext:
             context.load_cert_chain(*cert)
             warn_of_open_key(cert[1])
             if fault := fault_of(*cert, is_server=False):
-                hint = "renew it, or set the clock of this host"
+                hint = remedy_of(fault)
     except (OSError, ValueError) as error:
         fault = unloaded(error, *files)
     if fault is not None:

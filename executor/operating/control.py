@@ -43,7 +43,7 @@ from aiohttp.typedefs import Handler, Middleware
 
 from firable.executor.loopback import is_loopback
 from firable.executor.operating.door import CONNECTIONS_MAX, Door, listening_at
-from firable.executor.operating.own_certificate import fault_of, fault_of_authority, unloaded
+from firable.executor.operating.own_certificate import fault_of, fault_of_authority, remedy_of, unloaded
 from firable.executor.operating.situation import Situation, State
 from firable.executor.protocol.commands import SAID, Answer
 from firable.executor.reasons import reason
@@ -339,10 +339,11 @@ def tls_context(certificate: str, key: str, client_authority: str | None) -> ssl
     """The server's side of TLS; with an authority, of clients that it has signed only. Raises `InputError` F5062."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
-    whose, hint = "the certificate of the operator's endpoint", "renew it, or set the clock of this host"
+    whose, hint = "the certificate of the operator's endpoint", ""
     try:
         context.load_cert_chain(certificate, key)
-        fault = fault_of(certificate, key, is_server=True)
+        if fault := fault_of(certificate, key, is_server=True):
+            hint = remedy_of(fault)
     except (OSError, ValueError) as error:
         fault = unloaded(error, certificate, key)
         hint = "name PEM files of a certificate and its key"

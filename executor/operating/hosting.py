@@ -24,7 +24,7 @@ from firable.executor.operating.conduct import UNATTENDED, Conduct, Watch
 from firable.executor.operating.host import Host
 from firable.executor.operating.local_monitor import LocalMonitor
 from firable.executor.operating.monitor import Divergence
-from firable.executor.operating.own_certificate import fault_of, fault_of_authority, unloaded
+from firable.executor.operating.own_certificate import fault_of, fault_of_authority, remedy_of, unloaded
 from firable.executor.operating.service import demand_no_loop, figures_for, patience_with, run_to_the_end
 from firable.executor.operating.situation import Situation
 from firable.executor.operating.taken_up import opened
@@ -169,7 +169,7 @@ def _demand_certificates(authority: str, certificate: str, key: str, *, serves: 
     for is_server in (True,) * serves + (False,) * joins:
         if fault := fault_of(certificate, key, is_server=is_server):
             message = f"the certificate {printable(certificate)} cannot be used: {printable(fault)}"
-            raise InputError([Diagnostic("F5062", message, "renew it, or set the clock of this host")])
+            raise InputError([Diagnostic("F5062", message, remedy_of(fault))])
 
 
 def _in_order(bundle: Bundle, machines: Collection[str] | None = None) -> tuple[str, ...]:

@@ -91,3 +91,10 @@ def fault_of(certificate: str, key: str, *, is_server: bool) -> str | None:
             except ssl.SSLError as error:
                 return str(error.reason or error)
     return None
+
+
+def remedy_of(fault: str) -> str:
+    """What to do about a certificate of which `fault_of` has told a fault."""
+    if "purpose" in fault:
+        return "take one made for it: serverAuth for who listens or serves, clientAuth for who joins or operates"
+    return "renew it, or set the clock of this host"

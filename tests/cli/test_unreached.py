@@ -202,3 +202,22 @@ def test_a_file_that_holds_no_token_is_told(text: str, tmp_path: Path, capsys: p
     (tmp_path / "token").write_text(text)
     assert main(["operate", "http://127.0.0.1:9", "stop", "--token-file", str(tmp_path / "token")]) == 2
     assert "error[F1001]" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("asks", [True, False])
+def test_ones_own_certificate_for_the_other_side_is_no_matter_of_its_date(
+    asks: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    side = ExtendedKeyUsageOID.SERVER_AUTH if asks else ExtendedKeyUsageOID.CLIENT_AUTH
+    own = Site(tmp_path / "site").host("anna", purpose=side)
+    if asks:
+        address = "https://127.0.0.1:9"
+        assert main(["operate", address, "stop", "--ca", own.authority, "--cert", own.certificate, own.key]) == 2
+        said = capsys.readouterr().err
+    else:
+        with pytest.raises(InputError) as caught:
+            tls_context(own.certificate, own.key, None)
+        said = f"{caught.value}{caught.value.diagnostics[0].hint}"
+    assert "purpose" in said
+    assert "clientAuth for who joins or operates" in said
+    assert "renew" not in said
