@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from firable.cli.main import _is_hung_up
+from firable.cli.main import _is_hung_up, main
 
 FIRABLE = [sys.executable, "-m", "firable.cli"]
 SAYS_TOO_MUCH = [["check", "catalogue:one_robot"], ["check", "catalogue:one_robot", "--format", "json"], ["--help"]]
@@ -69,6 +69,17 @@ runpy.run_module("firable.cli", run_name="__main__", alter_sys=True)
 """
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr.strip()) == (3, "", "interrupted: nothing is known yet")
+
+
+def test_ctrl_c_while_a_class_is_loaded_is_no_fault_of_the_program(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def load(_name: str) -> None:
+        raise RuntimeError("Error calling __set_name__ on 'cached_property'") from KeyboardInterrupt()
+
+    monkeypatch.setattr("firable.cli.main.import_module", load)
+    assert main(["check", "catalogue:one_robot"]) == 3
+    assert capsys.readouterr().err == "interrupted: nothing is known yet\n"
 
 
 def test_a_device_that_is_no_terminal_is_no_closed_one() -> None:
