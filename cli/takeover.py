@@ -69,6 +69,7 @@ def takeover(
     from firable.executor.operating.dispatch import TAKEN
     from firable.executor.operating.hosting import machines_of as hosted
     from firable.executor.operating.running import load
+    from firable.executor.operating.taken_up import MACHINES
     from firable.executor.protocol.deciders import TOP, coordinators
     from firable.nets.bundle import read_bundle
 
@@ -83,13 +84,13 @@ def takeover(
     machines = {file: machines_of(file) for file in journals}
     kept: dict[str, dict[str, Stored]] = {}
     memories: dict[str, Memory] = {}
-    taken: dict[str, Mapping[str, Stored]] = {}
+    aside: dict[str, Mapping[str, Mapping[str, Stored]]] = {}
     with ExitStack() as held:  # nobody runs the old bundle on while it is taken over
         for file, names in machines.items():
             read = held.enter_context(closing(SqliteJournal(file, before.digest, names)))
             kept |= {name: dict(read.kept(name)) for name in names}
             memories[file] = remembered(read.kept(HOSTS), read.age)
-            taken[file] = read.kept(TAKEN)
+            aside[file] = {name: read.kept(name) for name in (TAKEN, MACHINES)}
         _refuse_copies(machines, memories)
         everything = [*coordinators(before.decomposition), *(subnet.name for subnet in before.decomposition.subnets)]
         controllers = dealt_out(machines, everything, [subnet.name for subnet in after.decomposition.subnets])
@@ -107,7 +108,7 @@ def takeover(
         if len(journals) == 1 and Path(f"{journals[0]}.cell").is_file():  # the simulated cell, if there is one
             cells = {f"{into[0]}.cell": Path(f"{journals[0]}.cell").read_bytes()}
         with _removed_if_it_fails([name for file in written for name in journal_files(file)], marks):
-            witnesses, whole = _made(written, after.digest, moved, {targets[file]: of for file, of in taken.items()})
+            witnesses, whole = _made(written, after.digest, moved, {targets[file]: of for file, of in aside.items()})
             # In this order, however this ends: a witness without its journal is refused, so that no host begins the new
             # bundle anew; a marked journal is refused, so that none runs the old one on; and only then the new ones are
             # there.
@@ -202,30 +203,33 @@ def _refuse_copies(machines: Mapping[str, Sequence[str]], memories: Mapping[str,
 
 
 def _made(
-    journals: Mapping[str, Sequence[str]], digest: str, moved: Takeover, taken: Mapping[str, Mapping[str, Stored]]
+    journals: Mapping[str, Sequence[str]],
+    digest: str,
+    moved: Takeover,
+    aside: Mapping[str, Mapping[str, Mapping[str, Stored]]],
 ) -> tuple[dict[str, bytes], dict[str, bytes]]:
-    """The witnesses and the journals, with their machines and what these have taken: made aside, to be whole."""
+    """The witnesses and the journals, with their machines, and what was kept `aside`: made apart, to be whole."""
     from firable.executor.journal.journal import sync_now
     from firable.executor.journal.memory import HOSTS, keeping, new_name
     from firable.executor.journal.sqlite_journal import SqliteJournal, witness_of
     from firable.executor.links.storages import Memory, Met, Storage
-    from firable.executor.operating.dispatch import TAKEN
     from firable.executor.protocol.messages import Keep
 
     storages = {file: Storage(new_name()) for file in journals}
     of = {name: storages[file] for file, names in journals.items() for name in names}
-    with TemporaryDirectory() as aside:
+    with TemporaryDirectory() as apart:
         witnesses: dict[str, bytes] = {}
         whole: dict[str, bytes] = {}
         for number, (file, names) in enumerate(journals.items()):
-            written = Path(aside, str(number))
+            written = Path(apart, str(number))
             others = Memory(
                 storages[file], {name: Met(storage.name) for name, storage in of.items() if name not in names}
             )
             with closing(SqliteJournal(written, digest, names)) as journal:
                 for name in names:  # of a coordinator that decides nothing there is nothing to keep
                     journal.write(name, [Keep(key, value) for key, value in moved.kept.get(name, {}).items()])
-                journal.write(TAKEN, [Keep(place, entry) for place, entry in taken[file].items()])
+                for name, of_name in aside[file].items():
+                    journal.write(name, [Keep(key, value) for key, value in of_name.items()])
                 if others.known:
                     journal.write(HOSTS, keeping(others))
                 sync_now(journal)

@@ -39,8 +39,8 @@ from firable.executor.protocol.messages import Effect, Keep, Stored
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.source import printable
 
-FORMAT: Final = 2
-"""1 had a word in one piece (`stored_word`)."""
+FORMAT: Final = 3
+"""1 had a word in one piece (`stored_word`); 2 did not say on what its run commands (`taken_up`)."""
 
 _SCHEMA: Final = """
     create table header (format integer, digest text, machines text, generation integer, total integer);

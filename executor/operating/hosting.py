@@ -17,6 +17,7 @@ from typing import Final
 
 from firable.executor.drivers.bound import BoundDriver
 from firable.executor.drivers.driver import Drivers
+from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.drivers.rivals import listen_first
 from firable.executor.journal.sqlite_journal import refuse_taken_over
 from firable.executor.links.link import Greeting, Link, called
@@ -27,7 +28,7 @@ from firable.executor.operating.monitor import Divergence
 from firable.executor.operating.own_certificate import fault_of, fault_of_authority, remedy_of, unloaded
 from firable.executor.operating.service import demand_no_loop, figures_for, patience_with, run_to_the_end
 from firable.executor.operating.situation import Situation
-from firable.executor.operating.taken_up import opened
+from firable.executor.operating.taken_up import On, opened
 from firable.executor.protocol.deciders import TOP, controller_of, coordinator_at, coordinators
 from firable.nets.bundle import Bundle
 from firable.nets.decomposition import Decomposition
@@ -236,9 +237,11 @@ def run_host(
     monitor = None
     if plant is not None and conduct.watch is not Watch.IGNORE:
         monitor = LocalMonitor(bundle.decomposition, controllers, plant)
-    with opened(bundle.decomposition, bundle.digest, conduct.journal_path, conduct.trace, machines=machines) as files:
+    on = On.NOTHING if isinstance(driver, DryRunDriver) else On.MACHINES
+    decomposition, journal = bundle.decomposition, conduct.journal_path
+    with opened(decomposition, bundle.digest, journal, conduct.trace, machines=machines, on=on) as files:
         host = Host(
-            bundle.decomposition,
+            decomposition,
             driver,
             files.recorder,
             conduct,

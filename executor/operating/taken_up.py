@@ -5,7 +5,7 @@
     cell.journal.cell          what was done to the simulated cell: it outlives the process, as machines do
 
 Whatever cannot go on from where the last process was is refused, rather than begun anew beside machines that are
-somewhere else.
+somewhere else; and so is what would go on beside other machines than those of that process.
 """
 
 from __future__ import annotations
@@ -14,7 +14,9 @@ import time
 from collections.abc import Collection, Iterator
 from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
+from typing import Final
 
 from firable.executor.cell.cell_log import PUT_BACK, CellLog
 from firable.executor.journal.journal import Journal, MemoryJournal
@@ -22,7 +24,7 @@ from firable.executor.journal.sqlite_journal import SqliteJournal
 from firable.executor.operating.recorder import CELL, KEY, TRACE, LineStream, Recorder, TraceFile, size_bytes_of
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.deciders import coordinators
-from firable.executor.protocol.messages import Stored
+from firable.executor.protocol.messages import Keep, Stored
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.interchange import net_digest
@@ -30,6 +32,19 @@ from firable.nets.machines.plant_file import PlantModel
 from firable.nets.net import Net
 from firable.nets.source import printable
 from firable.semantics.trace import Start
+
+MACHINES: Final = "\nmachines"
+"""Whose row of the journal says on what the run commands: no machine of the protocol has a line feed in its name."""
+
+ON: Final = "on"
+
+
+class On(StrEnum):
+    """On what a run commands. Its journal tells where that stands, and nothing of what stands elsewhere."""
+
+    MACHINES = "the machines of a binding"
+    SIMULATED = "a simulated cell"
+    NOTHING = "no machines, as a dry run"
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +68,13 @@ def opened(
     *,
     simulated: tuple[PlantModel, int, int] | None = None,
     machines: tuple[str, ...] = (),
+    on: On = On.MACHINES,
 ) -> Iterator[Files]:
     """The files of a run, for as long as it lasts; without a journal nothing is taken up.
 
     `simulated` are plant, workpieces and seed of the simulated cell that would have to be where it was, if there is
-    one; `machines` those of one host among others, whose clock goes on while it is down.
+    one; `machines` those of one host among others, whose clock goes on while it is down; `on` is what runs without a
+    simulated cell are on.
 
     Raises `InputError` F5031-F5034 for a journal that cannot be gone on with, F5035 for a simulated cell of another
     run, F1017 for a trace that cannot be written or does not go on where it was.
@@ -69,6 +86,7 @@ def opened(
         names = machines or (*coordinators(decomposition), *(subnet.name for subnet in decomposition.subnets))
         if journal_path is not None:
             journal = stack.enter_context(closing(SqliteJournal(journal_path, digest, names)))
+            _demand_what_it_is_on(journal_path, journal, On.SIMULATED if simulated else on, names)
         kept = journal.kept(TRACE).get(KEY)
         begun = any(journal.kept(name) for name in names)
         is_taken_over = begun and kept is None
@@ -88,6 +106,18 @@ def opened(
         recorder = Recorder(net, net_digest(net), trace, kept, machines, now, start, cell)
         last = max(recorder.at_seconds, cell.end_seconds if cell is not None else 0.0, now - recorder.began)
         yield Files(journal, recorder, cell, last, begun)
+
+
+def _demand_what_it_is_on(path: Path | str, journal: Journal, on: On, names: Collection[str]) -> None:
+    """What a simulation or a dry run has done, no machine has done: its tokens stand where no machine is."""
+    if not any(journal.kept(name) for name in names):
+        journal.write(MACHINES, [Keep(ON, on.value)])
+    elif (before := journal.kept(MACHINES).get(ON)) != on:
+        message = (
+            f"{printable(str(path))}: the journal is of a run on {printable(str(before))}, and this one is on {on}"
+        )
+        hint = "name another journal: the machines of this run are not where that one has left its own"
+        raise InputError([Diagnostic("F5031", message, hint)])
 
 
 def _demand_the_same(path: Path | str, kept: Stored | None) -> None:

@@ -10,6 +10,7 @@ from firable.decompose.splitting.cut import split
 from firable.executor.journal.journal import sync_now
 from firable.executor.journal.sqlite_journal import SqliteJournal
 from firable.executor.links.link import COORDINATOR
+from firable.executor.operating.taken_up import MACHINES, ON, On
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.messages import Keep, Stored
 from firable.nets.bundle import read_bundle
@@ -88,6 +89,7 @@ def journal(path: Path, of: Path, marking: set[str], machines: tuple[str, ...] =
     kept = kept_in(marking, read.decomposition)
     kept = {machine: records for machine, records in kept.items() if not machines or machine in machines}
     written = SqliteJournal(path, read.digest, kept)
+    written.write(MACHINES, [Keep(ON, On.MACHINES.value)])
     for machine, records in kept.items():
         written.write(machine, [Keep(key, value) for key, value in records.items()])
     sync_now(written)
