@@ -66,18 +66,20 @@ def live_io(
     that is lost. Where the device does not take it, that is told at the end.
 
     With --send this is the master of the devices: it gives them their heartbeats, and drives the safe outputs at both
-    ends. An emergency stop ends it. Never do that beside a running cell.
+    ends. An emergency stop ends it. Never do that beside a running cell: where the heartbeat of another program is
+    heard on a device, nothing is sent.
 
     --once waits for all devices at the same time, for each as long as its `start_s` says, and names those that do not
     answer.
 
     Ctrl-C ends it, as does a request to terminate or the end of its terminal. Exit codes: 0, or 1 where a machine was
     stopped or has failed at what was sent, or something was not forced or not taken; 2 for a binding that cannot be
-    used or a serial line that another program has; and 3 where --once cannot read something.
+    used, or where another program has a serial line or commands a device; and 3 where --once cannot read something.
     """
     import asyncio
 
     from firable.executor.drivers.fitting import misfits
+    from firable.executor.drivers.rivals import listen_first
     from firable.executor.operating.uncut import ended_by_signals
     from firable.nets.diagnostics import InputError
 
@@ -93,6 +95,8 @@ def live_io(
     if net is not None and (problems := misfits(binding, net)):
         raise InputError(problems)
     places = _sent(binding, send, net)
+    if places:
+        listen_first(binding)
     heard = _Heard() if format_ == "text" else _HeardByPrograms(bind)
 
     async def ended() -> int:

@@ -6,7 +6,7 @@ year. Both would command the machines, each would stop those of the other at its
 the device would be content with the heartbeat of either. So before a run begins, before its journal is opened and
 anything is written, it listens for the time of four beats, or of four polls where these take longer. A heartbeat that
 changes twice while nobody here sends it is another program's, and the run does not begin (F5106). One change may be the
-last beat of a process that was killed, still on its way.
+last beat of a process that was killed, still on its way. Who sends commands by hand (`firable io --send`) listens, too.
 
 What cannot be heard says nothing: a heartbeat that the device does not show or that comes too seldom, and whatever goes
 wrong with a connection here, which goes wrong once more in the run and is dealt with there. A line has one program at a
@@ -122,5 +122,5 @@ async def _rival(binding: Binding, name: str) -> Diagnostic | None:
     if not is_heard:
         return None
     message = f"another program sends the heartbeat of '{name}', at '{heartbeat.write}', and commands its machines"
-    hint = "this run has not begun, and has written nothing: find out which of the two is the one that should run"
+    hint = "nothing was begun or written here: find out which of the two is the one that should command them"
     return binding.problem("F5106", ("devices", name, "heartbeat", "write"), message, hint)

@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Sequence
 from importlib.metadata import EntryPoint
+from itertools import count
 from pathlib import Path
 from typing import cast
 
@@ -23,8 +24,10 @@ from firable.cli.main import main as firable
 from firable.executor.drivers import kinds, serial_line
 from firable.executor.drivers.bench import until
 from firable.executor.drivers.bound import BoundDriver
+from firable.executor.drivers.cancelling import ended
 from firable.executor.drivers.device import InUseError, LinkError, Point, Value, Wanted, Writes
 from firable.executor.drivers.driver import Quality, Reading
+from firable.executor.drivers.far_side.modbus_server import ModbusTcpEnd
 from firable.executor.drivers.far_side.serial_device import SerialEnd
 from firable.executor.drivers.sparing import Sparing
 
@@ -180,6 +183,41 @@ def test_who_sends_by_hand_does_not_wait_for_a_line_of_another_program_to_stop_i
     assert time.monotonic() - begun < 25
     os.close(near)
     os.close(far)
+
+
+def test_who_sends_by_hand_beside_a_running_cell_is_refused_before_its_machines_are_stopped(tmp_path: Path) -> None:
+    net, bind = tmp_path / "arm.firable.yaml", tmp_path / "arm.bind.yaml"
+    net.write_text(NET)
+    written: list[Point] = []
+
+    async def main() -> tuple[int | None, str]:
+        end = ModbusTcpEnd()
+        await end.start(lambda point, _: written.append(point))
+        device = (
+            f"{{driver: modbus-tcp, host: 127.0.0.1, port: {end.port}, heartbeat: {{write: holding 0, every_s: 0.2}}"
+        )
+        channel = "channels: {A: {number: holding 11, taken: input 10}}"
+        text = BIND.replace("{driver: serial, port: PORT, safe: {out: 0}", f"{device}, safe: {{coil 0: true}}")
+        text = text.replace("channels: {A: {command: move, taken: taken}}", channel)
+        bind.write_text(text.replace("read: key", "read: discrete 1"))
+
+        async def run() -> None:
+            for beat in count():
+                end.show("holding 0", beat)
+                await asyncio.sleep(0.01)
+
+        beating = asyncio.create_task(run())
+        try:
+            process = await io(bind, "--net", str(net), "--send", "a.away", "--once")
+            _, said = await asyncio.wait_for(process.communicate(), PATIENCE_SECONDS)
+        finally:
+            await ended([beating])
+            await end.stop()
+        return process.returncode, said.decode()
+
+    code, said = asyncio.run(main())
+    assert (code, written) == (2, [])
+    assert "error[F5106]: another program sends the heartbeat of 'line'" in said
 
 
 def test_line_that_was_found_in_use_is_not_asked_for_again() -> None:

@@ -293,7 +293,7 @@ cell.bind.yaml:8:17: error[F5106]: another program sends the heartbeat of 'plc',
  machines
     8 |     heartbeat: {write: holding 0, every_s: 0.2}
                         ^^^^^
-  hint: this run has not begun, and has written nothing: find out which of the two is the one that should run
+  hint: nothing was begun or written here: find out which of the two is the one that should command them
 """,
     ),
     "F9001": (
