@@ -174,7 +174,8 @@ class _Reading:
                 if not is_name(name) or "." in name:
                     self.problem("F2012", f"{name!r} is not a name here", _NAME_HINT, path)
                 elif name in taken:
-                    self.problem("F2012", f"'{name}' has a meaning of its own here", "take another name", path)
+                    hint = f"take another name than {' or '.join(sorted(taken))}"
+                    self.problem("F2012", f"'{name}' has a meaning of its own here", hint, path)
                 if table in _WORDS and (other := words.setdefault(name, table)) != table:
                     message = f"'{name}' is one of the {other} and one of the {table}"
                     self.problem("F2001", message, "templates and moves tell them apart by name alone", path)

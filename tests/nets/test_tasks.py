@@ -161,6 +161,16 @@ def test_a_key_that_holds_something_else_where_it_is_left_out_is_told_so() -> No
     assert parse_tasks(TASK.replace("{if: robot.near}", "{to: []}"))["fetch"].start.targets == ()
 
 
+def test_which_names_have_a_meaning_of_their_own_is_told() -> None:
+    for old, new, hint in (
+        ("      a: {", "      again: {", "take another name than again or end or start"),
+        ("          held:", "          idle:", "take another name than given or idle"),
+    ):
+        with pytest.raises(InputError) as refused:
+            parse_tasks(TASK.replace(old, new))
+        assert refused.value.diagnostics[0].hint == hint
+
+
 def test_all_mistakes_of_a_file_are_reported_together() -> None:
     text = TASK.replace("to: robot.take,", "to: x,").replace("release: source", "release: y").replace("{source}", "{z}")
     with pytest.raises(InputError) as refused:
