@@ -13,7 +13,7 @@ diff.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
 from itertools import starmap
 from typing import Any
@@ -76,6 +76,26 @@ def with_owners(net: Net, owner_of: Mapping[str, str], controllers: Sequence[Con
         net.description,
         net.expected,
     )
+
+
+def with_those_named(net: Net, controllers: Iterable[Controller]) -> tuple[Controller, ...]:
+    """These controllers, and those of the net that they name and that may own nothing: who stands above one, and whom
+    a resource opens to.
+
+    >>> net = Net("n", controllers=(Controller("line"), Controller("robot", under="line"), Controller("belt")))
+    >>> [one.name for one in with_those_named(net, net.controllers[1:2])]
+    ['robot', 'line']
+    """
+    given = {controller.name: controller for controller in controllers}
+    known = {controller.name: controller for controller in net.controllers} | given
+    named = [place.resource.idle.partition(".")[0] for place in net.places if place.resource]
+    named += [controller.under for controller in given.values() if controller.under]
+    besides: set[str] = set()
+    while named:
+        if (name := named.pop()) in known and name not in besides:
+            besides.add(name)
+            named += filter(None, [known[name].under])
+    return (*given.values(), *(one for one in net.controllers if one.name in besides and one.name not in given))
 
 
 def resource_of(net: Net, place: Place, name: str) -> str | None:

@@ -25,7 +25,7 @@ from typing import Final
 
 from firable.nets.diagnostics import Diagnostic, InputError, Span, Subject
 from firable.nets.net import Controller, Net
-from firable.nets.owning import with_owners
+from firable.nets.owning import with_owners, with_those_named
 from firable.nets.source import read_source
 from firable.nets.yaml_tree import Mapping, Node, Scalar, data, node_span, parse_tree
 from firable.nets.yaml_tree import Sequence as List
@@ -48,6 +48,8 @@ Rules = Table[str, Sequence[Pattern]]
 
 def owned_by_rules(net: Net, rules: Rules) -> Net:
     """The net with the owners that the rules give, whatever owners it had before, and the controllers of the rules.
+
+    Of those that own nothing then it keeps who stands above these, and whom a resource of a conceptual net opens to.
 
     A rule is asked of the name in the file. Raises `InputError`: F2002 for a pattern that matches nothing, F2023 for a
     place or signal to which two rules give an owner; F2011, with no F2002, for one to which no rule does.
@@ -80,7 +82,7 @@ def owned_by_rules(net: Net, rules: Rules) -> Net:
     if problems:
         raise InputError(problems)
     known = {controller.name: controller for controller in net.controllers}
-    controllers = [known.get(name, Controller(name)) for name in rules]
+    controllers = with_those_named(net, [known.get(name, Controller(name)) for name in rules])
     return with_owners(net, {name: owners[0] for name, owners in by_rule.items()}, controllers)
 
 

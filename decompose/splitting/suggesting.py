@@ -20,7 +20,7 @@ from firable.analysis.deadline import Deadline
 from firable.decompose.splitting.hypergraph import Hypergraph, hypergraph
 from firable.decompose.splitting.partitioning import partition
 from firable.nets.net import Controller, Net
-from firable.nets.owning import with_owners
+from firable.nets.owning import with_owners, with_those_named
 
 SLACK: Final = 0.6
 _MACHINES_MAX: Final = 3  # in the name of a controller
@@ -90,7 +90,7 @@ def suggest(net: Net, n_controllers: int, *, slack: float = SLACK, deadline: Dea
     owner_of = {name: names[part] for block, part in zip(graph.blocks, found.partition, strict=True) for name in block}
     cut = set(graph.cut(found.partition))
     return Suggestion(
-        with_owners(net, owner_of, [Controller(name) for name in names]),
+        with_owners(net, owner_of, with_those_named(net, map(Controller, names))),
         found.method,
         found.optimal,
         tuple(

@@ -107,6 +107,36 @@ def test_rules_give_the_cell_back_the_owners_that_its_names_tell() -> None:
     assert [row.name for row in split(owned_by_rules(bare(net), rules)).table] == [f"G{n}" for n in range(1, 10)]
 
 
+LAYERED = """\
+firable: 1
+cell: layered
+controllers:
+  line: {coordinator: true}
+  cell: {under: line}
+  robot: {under: cell, start: free, places: {free: , busy: }}
+  table: {under: cell, start: empty, places: {empty: , full: }}
+transitions:
+  load: {from: [robot.free, table.empty], to: [robot.busy, table.full]}
+"""
+
+
+def test_rules_keep_who_stands_above_those_that_they_name() -> None:
+    """They own nothing, and decide what those below them do together."""
+    net = parse_net(LAYERED)
+    owned = owned_by_rules(net, patterns(robot="robot.*", table="table.*"))
+    assert set(owned.controllers) == set(net.controllers)
+    assert parse_net(format_net(owned)) == in_file_order(owned)
+
+
+@pytest.mark.parametrize("by_rule", [True, False])
+def test_whom_a_resource_opens_to_stays_a_controller(by_rule: bool) -> None:
+    """Or the net that is written could not be refined any more."""
+    net = catalogue_net("conceptual_one_robot")
+    owned = owned_by_rules(net, patterns(tasks="*")) if by_rule else suggest(net, 2, slack=1.0).net
+    kept = {controller.name for controller in owned.controllers}
+    assert {place.resource.idle.partition(".")[0] for place in net.places if place.resource} < kept
+
+
 def test_rules_are_read_from_a_file(tmp_path: Path) -> None:
     path = tmp_path / "owners.yaml"
     path.write_text("robot: [r_*, door]\nmc: m_*\n", encoding="utf-8")
