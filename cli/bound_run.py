@@ -11,7 +11,7 @@ from firable.cli import text
 from firable.cli.log import told_aside
 from firable.cli.options import binding_for
 from firable.cli.report import Report
-from firable.cli.watched import AFTER_A_FAULT, machines_verdict, show_coalesced, since
+from firable.cli.watched import AFTER_A_FAULT, machines_verdict, show_coalesced, show_counts
 
 if TYPE_CHECKING:
     from firable.executor import PlantModel, RunReport
@@ -33,7 +33,7 @@ def run_bound_of(path: str, bundle: Bundle, bind: str, conduct: Conduct, plant: 
     with told_aside(_told, conduct.log) as tell:
         report = run_bound(bundle, binding, replace(conduct, tell=tell), plant=plant)
     known = report.to_json()
-    of_workpieces = {"delivered", "inside", "lost", "doubled", "decided", "simulated_seconds"}
+    of_workpieces = {"delivered", "inside", "lost", "doubled", "simulated_seconds"}
     kept = {key: value for key, value in known.items() if key not in of_workpieces}
     return Report(
         "run",
@@ -55,11 +55,7 @@ def show_bound(report: Report) -> None:
     if done["state"] == "stopped":
         for line in done["blocked"][:_BLOCKED_SHOWN]:
             click.echo(f"    {line}")
-    click.echo(
-        f"  {text.counted(sum(done['firings'].values()), 'firing')}, "
-        f"{text.counted(done['commands'], 'command')} issued, "
-        f"{text.counted(done['messages'], 'message')} between coordinator and controllers{since(done)}"
-    )
+    show_counts(done)
     show_coalesced(done["coalesced"])
     if refuted := [verdict for verdict in report.verdicts if not verdict.holds]:
         text.show_verdicts(report.net, refuted)

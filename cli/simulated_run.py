@@ -11,7 +11,7 @@ import click
 from firable.cli import text
 from firable.cli.log import told_aside
 from firable.cli.report import Report
-from firable.cli.watched import machines_verdict, show_coalesced, since
+from firable.cli.watched import machines_verdict, show_coalesced, show_counts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -50,16 +50,7 @@ def show_simulated(report: Report) -> None:
         f"{text.counted(len(done['delivered']), 'workpiece')} carried through, {len(done['lost'])} lost, "
         f"{len(done['doubled'])} doubled, {len(done['inside'])} still inside"
     )
-    several = len(done["decided"]) > 1
-    between = f"between {'coordinators' if several else 'coordinator'} and controllers"
-    click.echo(
-        f"  {text.counted(sum(done['firings'].values()), 'firing')}, "
-        f"{text.counted(done['commands'], 'command')} issued, {text.counted(done['messages'], 'message')} {between}"
-        f"{since(done)}"
-    )
-    if several:
-        told = ", ".join(f"{count:,} by {name}" for name, count in done["decided"].items())
-        click.echo(f"  decided: {told}")
+    show_counts(done)
     show_coalesced(done["coalesced"])
     if done["state"] in {"stopped", "done"} and done["message"]:
         click.echo(f"  {done['message']}")

@@ -41,9 +41,18 @@ def machines_verdict(report: RunReport | HostReport, method: str) -> tuple[Verdi
     return (Verdict(name, Status.VIOLATED, statement, method, hint=hint, subjects=found.places),)
 
 
-def since(run: Mapping[str, Any]) -> str:
-    """From when on firings, commands and messages are counted, where a run was taken up."""
-    return f", since it was taken up at {run['begin_seconds']:,.0f} s" if run["begin_seconds"] else ""
+def show_counts(run: Mapping[str, Any]) -> None:
+    """How much was done, since when where the run was taken up, and by which coordinator where there are several."""
+    since = f", since it was taken up at {run['begin_seconds']:,.0f} s" if run["begin_seconds"] else ""
+    several = len(run["decided"]) > 1
+    between = f"between {'coordinators' if several else 'coordinator'} and controllers"
+    click.echo(
+        f"  {text.counted(sum(run['firings'].values()), 'firing')}, "
+        f"{text.counted(run['commands'], 'command')} issued, "
+        f"{text.counted(run['messages'], 'message')} {between}{since}"
+    )
+    if several:
+        click.echo(f"  decided: {', '.join(f'{count:,} by {name}' for name, count in run['decided'].items())}")
 
 
 def show_coalesced(changes: Mapping[str, int]) -> None:

@@ -6,8 +6,10 @@ import shutil
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
+from unittest.mock import Mock
 
 import jsonschema
 import pytest
@@ -420,3 +422,18 @@ def test_the_report_of_machines_that_are_not_as_they_are_modelled_is_as_its_sche
     }
     jsonschema.Draft202012Validator(bound).validate(report)
     assert report["run"]["divergence"]["places"]
+
+
+def test_a_run_of_layers_on_machines_says_what_each_coordinator_has_decided(
+    bundle: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ended = execute(decomposition_of("one_robot"), SimulatedCell(plant_of("one_robot"), workpieces=1))
+    monkeypatch.setattr(bound_run, "binding_of", lambda _: None)
+    for decided, told in (
+        ({"line": 6, "cell": 3}, "between coordinators and controllers\n  decided: 6 by line, 3 by cell\n"),
+        ({"line": 9}, "between coordinator and controllers\n\n"),
+    ):
+        found = replace(ended, decided=decided)
+        monkeypatch.setattr(running, "run_bound", Mock(return_value=found))
+        bound_run.show_bound(run_bound_of(bundle, read_bundle(bundle), "b", Conduct(), None))
+        assert told in capsys.readouterr().out
