@@ -136,7 +136,7 @@ def loop_report(
         course=course,
         files=files,
         binding=bind or "",
-        loop_net=report.loop.net,
+        loops=dict.fromkeys((verdict.name for verdict in report.verdicts), report.loop.net) | faults.nets,
         positions=loaded.positions,
         loop={
             "machines": machines,
@@ -202,7 +202,7 @@ def show_loop(report: Report, *, verbose: bool) -> None:
         click.echo(click.style(line.rstrip(), fg="yellow" if differs else None))
         if "remark" in row:
             click.echo(f"      {row['remark']}")
-    text.show_verdicts(report.loop_net or report.net, report.verdicts, verbose=verbose)
+    text.show_verdicts(report.net, report.verdicts, verbose=verbose, loops=report.loops)
     if "faults_not_asked" in loop:
         click.echo(f"\n{loop['faults_not_asked']}")
     text.show_summary(report)

@@ -23,6 +23,7 @@ from firable.cli.votes import Votes, is_vote, votes_told
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from firable.nets.net import Net
     from firable.nets.verdict import Verdict
 
 SIGNS: Final = {"violated": ("✗", "red"), "unknown": ("?", "yellow"), "proved": ("✓", "green")}
@@ -106,7 +107,8 @@ def _report(
     with stages() as begins:
         found = prove_split(decomposition, timeout_ms=max(1, round(timeout * 1000)), begins=begins)
     verdicts = (*found.verdicts, *side_conditions(decomposition))
-    loop, evidence = None, dict[str, str | bytes](found.files)
+    loops: dict[str, Net] = {}
+    evidence = dict[str, str | bytes](found.files)
     if machines is not None:
         from firable.analysis.spaces.reachability import Budget
         from firable.decompose.proofs.held_gates import held_gates
@@ -115,7 +117,7 @@ def _report(
         model = read_machines_of(machines, loaded.net)
         held = held_gates(decomposition, model, Budget(seconds=timeout))
         notes += late_limits(model, loaded.net)
-        loop = held.loop
+        loops = dict.fromkeys((verdict.name for verdict in held.verdicts), held.loop.net)
         verdicts += held.verdicts
         if smt_dir is not None:
             evidence |= held.evidence()
@@ -137,7 +139,7 @@ def _report(
         assumptions=tuple(map(str, assumptions(decomposition))),
         standing=tuple(standing(decomposition, verdicts)),
         decomposition=replace(decomposition, free=told.free or ()),
-        loop_net=None if loop is None else loop.net,
+        loops=loops,
         positions=loaded.positions,
         protocols=told.protocols,
         outages=told.outages,
@@ -164,16 +166,16 @@ def _show(report: Report, answered: Sequence[Answered]) -> None:
     for line in report.standing:
         click.echo(f"  {line.name}  {line.says}")
         click.echo(f"      {line.status}: {line.by}")
-    if report.assumptions or report.loop_net is not None:
+    if report.assumptions or report.loops:
         _show_assumptions(report)
     for one in answered:
         show_protocol(one)
     refuted = [verdict for verdict in report.verdicts if not verdict.holds]
     told = [verdict for verdict in refuted if is_vote(verdict) or verdict.name.startswith("wrong.")]  # above
     refuted = [verdict for verdict in refuted if verdict not in told]
-    nets = {id(of.net): of.net for of in report.protocols.values()}
-    for net in (report.net, report.loop_net, *nets.values()):
-        if net is not None and (some := [verdict for verdict in refuted if report.net_of(verdict) is net]):
+    nets = (report.net, *report.loops.values(), *(of.net for of in report.protocols.values()))
+    for net in {id(net): net for net in nets}.values():
+        if some := [verdict for verdict in refuted if report.net_of(verdict) is net]:
             text.show_verdicts(net, some)
     text.show_summary(report)
     if report.files:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from firable.decompose.proofs.standing import Standing
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from firable.nets.verdict import Status, Verdict
 
 VERSION = 1
-_OF_THE_LOOP: Final = frozenset({"loop", "fault", "o4"})
 
 
 class ExitCode(IntEnum):
@@ -42,9 +41,9 @@ class ExitCode(IntEnum):
 class Report:
     """The verdicts of one command on one net, with what belongs to them; empty parts are left out of the JSON.
 
-    `loop_net` is the net with its machines, of which some verdicts show runs (`net_of`), and `protocols` are others, by
-    the names of the verdicts on them; `outages`, `faults` and `refutations` are told beside those. `claims` are, where
-    the verdicts say whether evidence shows something, what it claims of each. `binding` was found to fit the net.
+    `loops` are the nets with machines that some verdicts show runs of (`net_of`), by the names of these verdicts, and
+    `protocols` are others; `outages`, `faults` and `refutations` are told beside those. `claims` are, where the
+    verdicts say whether evidence shows something, what it claims of each. `binding` was found to fit the net.
     `page` is the report as a page for a person, where one was written. `again` says that the same was decided before,
     which a program need not know; `positions` say where the parts of the net stand in its file.
     """
@@ -66,7 +65,7 @@ class Report:
     bundle: Mapping[str, str] = field(default_factory=dict)
     loop: Mapping[str, Any] = field(default_factory=dict)
     decomposition: Decomposition | None = None
-    loop_net: Net | None = None
+    loops: Mapping[str, Net] = field(default_factory=dict)
     protocols: Mapping[str, ProtocolNet] = field(default_factory=dict)
     outages: Sequence[Outage] = ()
     faults: Sequence[OneFault] = ()
@@ -79,11 +78,9 @@ class Report:
 
     def net_of(self, verdict: Verdict) -> Net:
         """The net that the runs of a verdict are of."""
-        family = verdict.name.partition(".")[0]
         if verdict.name in self.protocols:
             return self.protocols[verdict.name].net
-        of_loop = family in _OF_THE_LOOP
-        return self.loop_net if of_loop and self.loop_net is not None else self.net
+        return self.loops.get(verdict.name, self.net)
 
     @property
     def status(self) -> Status:

@@ -12,6 +12,7 @@ import shutil
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from textwrap import wrap
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 import click
@@ -94,10 +95,13 @@ def rule(sequence: Sequence[str], by: str) -> str:
     return words[by] if sequence else "by the order of the file"
 
 
-def show_verdicts(net: Net, verdicts: Sequence[Verdict], *, verbose: bool = False) -> None:
+def show_verdicts(
+    net: Net, verdicts: Sequence[Verdict], *, verbose: bool = False, loops: Mapping[str, Net] = MappingProxyType({})
+) -> None:
     """Print all verdicts, those that must hold first, with the witnesses of what is violated.
 
     Method and cost, and the witnesses of warnings and of what is reachable and shall be, are told only if `verbose`.
+    `loops` are the nets that the witnesses of some are of, by the names of these verdicts.
     """
     told: dict[tuple[object, ...], str] = {}
     width = max((len(verdict.name) for verdict in verdicts), default=0)
@@ -107,7 +111,7 @@ def show_verdicts(net: Net, verdicts: Sequence[Verdict], *, verbose: bool = Fals
             click.echo(f"\n{click.style(title, bold=True)}")
         for verdict in some:
             click.echo(verdict_line(verdict, width))
-            for line in reasons(net, verdict, told, verbose=verbose):
+            for line in reasons(loops.get(verdict.name, net), verdict, told, verbose=verbose):
                 click.echo(f"      {line}")
 
 

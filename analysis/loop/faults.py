@@ -28,7 +28,7 @@ from firable.nets.formula import Formula, Holds, Not, Or
 from firable.nets.machines.closing import close
 from firable.nets.machines.loop import ACCIDENT, OVERRUN, ClosedLoop, Faults
 from firable.nets.machines.plant_file import PlantModel
-from firable.nets.net import Property
+from firable.nets.net import Net, Property
 from firable.nets.verdict import Status, Verdict, Weight
 
 _IN_DOUBT: Final = "it cannot fire again then, and is not known to be live without faults"
@@ -56,6 +56,11 @@ class FaultsAsked:
         return (
             f"{machines}: without faults no transition is live here, so a fault takes nothing, and repair gives nothing"
         )
+
+    @property
+    def nets(self) -> dict[str, Net]:
+        """The nets that the runs of the verdicts are of, by the names of these."""
+        return {family.name: one.loop.net for one in self.answered for family in one.families}
 
     def verdicts(self) -> Iterator[Verdict]:
         """The verdicts as they are told: what stands still after a fault, and what hangs, in one."""

@@ -94,6 +94,19 @@ def test_why_nothing_is_asked_of_faults_where_nothing_is_live_is_said(
     assert "not asked" not in capsys.readouterr().out
 
 
+def test_a_run_in_which_a_machine_fails_is_told_and_drawn_of_the_loop_in_which_it_may(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = tmp_path / "page.html"
+    assert main(["check", CELL, "--machines", PLANT, "--verbose", "--report", str(page)]) == 0
+    told = capsys.readouterr().out
+    about = told[told.index("no        fault.CV1 ") :]
+    steps = ("1. arrives/cv1_entry", "2. G1/raw", "3. CV1/fails/conveyor.cv1_run  CV1 RUN fails", "CV1 has failed, and")
+    at = [about.index(step) for step in steps]
+    assert at == sorted(at)
+    assert "<b>CV1 RUN fails</b>" in page.read_text("utf-8")
+
+
 def test_what_gates_free_was_too_hopeful_about_stands_out(wrong_plant: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", CELL, "--machines", wrong_plant]) == 1
     told = capsys.readouterr().out
