@@ -4,8 +4,9 @@ A machine that fails takes a command and never finishes it. What may fail is sai
 machine fails at a time; two at once are not asked about. Two loops are.
 
 *For good*: the fault is never repaired. No accident may follow from it, whatever the rest of the cell goes on to do:
-this must hold, and makes the fault *safe*. Which transitions can then come to stand still, and which places can hold
-their token for ever, is information: a cell does not go on without its robot, but its conveyors may.
+this must hold, and makes the fault *safe*. An accident before any fault follows from none, and is told of the loop
+without them. Which transitions can then come to stand still, and which places can hold their token for ever, is
+information: a cell does not go on without its robot, but its conveyors may.
 
 *Repaired*: a repairable fault ends at some time and the machine goes on with its command. From everywhere every
 transition that is live without faults must be able to fire again: the cell *recovers*. Nothing is said of how long it
@@ -20,13 +21,13 @@ from functools import partial
 from threading import Event
 from typing import Final
 
-from firable.analysis.loop.families import Answered, Family, answers, fires, never, possible
+from firable.analysis.loop.families import ENDED, Answered, Family, answers, any_of, fires, never, possible
 from firable.analysis.loop.verdicts import LoopReport, known_live, live_in
 from firable.analysis.question import listed
 from firable.analysis.spaces.reachability import Budget
-from firable.nets.formula import Formula, Holds, Not, Or
+from firable.nets.formula import And, Formula, Holds, Not, Or
 from firable.nets.machines.closing import close
-from firable.nets.machines.loop import ACCIDENT, OVERRUN, ClosedLoop, Faults
+from firable.nets.machines.loop import ClosedLoop, Faults
 from firable.nets.machines.plant_file import PlantModel
 from firable.nets.net import Net, Property
 from firable.nets.verdict import Status, Verdict, Weight
@@ -114,8 +115,10 @@ def _for_good(loop: ClosedLoop, live: tuple[str, ...]) -> Iterator[Family]:
     yield Family(
         "fault.safe",
         "no accident follows when a machine fails and is not repaired",
-        {"": never("fault.accident", Or((Holds(ACCIDENT), Holds(OVERRUN))))},
-        hint="a fault must stop what depends on the machine: gate it by a completion, not by a time",
+        # After an accident nothing fires: a machine that has failed then had failed before.
+        {"": never("fault.accident", And((ENDED, any_of(map(Holds, loop.failed.values())))))},
+        hint="a machine that takes longer leads there, too, so begin with loop.busy-machines and loop.accidents: gate "
+        "what depends on a machine by its completion, not by a time",
     )
     for machine, failed in loop.failed.items() if live else ():
         yield Family(

@@ -93,10 +93,11 @@ class Asked:
 
     def of_faults(self, live: Iterable[str]) -> Iterator[Question]:
         """What is asked of the cell of which one machine may fail for good; `live` fire again and again without."""
+        failed = _any(Holds(self.of(f"failed {machine}")) for machine in self.plant.may_fail)
         yield Question(
             "fault.safe",
             "no accident follows when a machine fails and is not repaired",
-            {"": _never("fault.accident", self.ended)},
+            {"": _never("fault.accident", And((self.ended, failed)))},
         )
         live = tuple(live)
         for machine in self.plant.may_fail if live else ():

@@ -20,7 +20,7 @@ from firable.nets.formula import Deadlock, parse_formula
 from firable.nets.machines.closing import close
 from firable.nets.machines.loop import Faults
 from firable.nets.machines.plant_file import PlantModel, parse_plant
-from firable.nets.net import ExternalGate, Net, Property, PropertyKind, TemporalProperty
+from firable.nets.net import ExternalGate, Net, Property, PropertyKind, TemporalProperty, Transition
 from firable.nets.temporal import Logic, parse_temporal
 from firable.nets.text import parse_net
 from firable.nets.verdict import Status
@@ -416,6 +416,57 @@ transitions:
 def test_a_fault_that_leads_to_an_accident_is_not_safe() -> None:
     net = net_with("command: MOVE,  to: CV1},  until: at_cv1, ", "command: MOVE,  to: CV1}, ")
     assert faults_of(net, catalogue_plant("one_robot"))["fault.safe"] is Status.VIOLATED
+
+
+HASTY = """\
+firable: 1
+cell: hasty
+controllers:
+  c:
+    start: [idle]
+    inputs: [entry, hand]
+    places:
+      idle:
+      frees: {send: {machine: M, command: UNCLAMP}}
+      again: {send: {machine: M, command: UNCLAMP}, until: free}
+      moves: {send: {machine: R, command: MOVE, to: TABLE}, until: at_table}
+transitions:
+  t: {from: c.idle, to: c.frees}
+  u: {from: c.frees, to: c.again}
+  v: {from: c.again, to: c.moves}
+"""
+
+
+def test_an_accident_before_anything_may_fail_is_none_of_a_fault() -> None:
+    report = check_loop(parse_net(HASTY), bench())
+    assert report.verdict("loop.busy-machines").status is Status.VIOLATED
+    assert faults_of(parse_net(HASTY), bench())["fault.safe"] is Status.PROVED
+
+    before = parse_net(HASTY.replace("[idle]", "[idle, other]").replace("idle:\n", "idle:\n      other:\n"))
+    before = replace(before, transitions=(*before.transitions, Transition("w", ("c.other",), ("c.moves",))))
+    (safe, *_) = check_faults(check_loop(before, bench()), bench())
+    assert safe.status is Status.VIOLATED
+    assert safe.witness is not None
+    assert [fired for (fired,) in safe.witness.firings if "/fails/" in fired] == ["R/fails/c.moves"]
+    assert "plant.R.failed" in safe.witness.marking
+
+
+@pytest.mark.parametrize("cell", SIZES)
+def test_a_machine_that_fails_does_nothing_that_one_which_takes_longer_does_not(cell: str) -> None:
+    """So an accident after a fault can happen without one, and what is live without faults fires after a repair."""
+    net, plant = catalogue_net(cell), catalogue_plant(cell)
+    well = {t.name: t for t in close(net, plant).net.transitions}
+    for faults in (Faults.FOR_GOOD, Faults.REPAIRED):
+        loop = close(net, plant, faults)
+        failed = set(loop.failed.values())
+        left = dict(well)
+        for t in loop.net.transitions:
+            if "/fails/" in t.name or t.name.endswith("/repaired"):
+                assert {*t.inputs, *t.outputs} <= failed
+                continue
+            assert failed.isdisjoint({*t.inputs, *t.outputs, *t.permissive})
+            assert replace(t, inhibitive=tuple(one for one in t.inhibitive if one not in failed)) == left.pop(t.name)
+        assert not left
 
 
 def test_a_plant_in_which_nothing_may_fail_has_no_verdicts_on_faults() -> None:
