@@ -133,7 +133,9 @@ class _Asked:
     "the one that the environment variable FIRABLE_CACHE names; where it is empty, nowhere.",
 )
 @click.option(
-    "--progress/--no-progress", default=None, help="Tell how far exploring is.  [default: where there is a terminal]"
+    "--progress/--no-progress",
+    default=None,
+    help="Tell on standard error how far exploring is.  [default: on a terminal; once a minute where there is none]",
 )
 @click.option("-v", "--verbose", is_flag=True, help="Tell methods, costs and the sequences of warnings too.")
 @formats_option

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -95,7 +95,7 @@ def loop_report(
 ) -> Report:
     """The report on one net with its machines; the evidence on each of its loops goes into a folder.
 
-    How far exploring is, is told as `progress_line` does. One Ctrl-C ends all that is asked.
+    What is asked, and how far exploring is, is told as `progress_line` does. One Ctrl-C ends all that is asked.
     """
     from threading import Event
 
@@ -111,9 +111,10 @@ def loop_report(
     model = read_machines_of(machines, loaded.net)
     interrupted = Event()
     with progress_line(progress) as line:
+        heard: dict[str, Any] = {} if line is None else {"begins": line.begins, "progress": line, "tell": line.say}
         with loaded.placing():
-            report = check_loop(loaded.net, model, allowed, progress=line, interrupted=interrupted)
-        faults = ask_faults(report.asked, model, allowed, progress=line, interrupted=interrupted)
+            report = check_loop(loaded.net, model, allowed, **heard, interrupted=interrupted)
+        faults = ask_faults(report.asked, model, allowed, **heard, interrupted=interrupted)
     files: tuple[str, ...] = ()
     if loop_file is not None:
         files = write_net(loop_file, report.closed.net)

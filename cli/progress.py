@@ -1,9 +1,11 @@
-"""A line on the terminal that tells how far an exploration has come, while somebody waits.
+"""A line that tells how far long work has come, while somebody waits.
 
-It goes to standard error, and by itself only where that is a terminal, so that reports and logs hold nothing of it; it
-begins after a second, because what is done sooner needs no line, and is wiped before the report is printed. Told is
-what the engine counts, markings and edges, and which verdict is being settled by itself, with how far that is: how much
-is still to come nobody knows, so that a bar or a percentage, the alternative, would be made up.
+It goes to standard error, so that reports hold nothing of it. On a terminal it begins after a second, because what is
+done sooner needs no line, is written over itself, and is wiped before the report is printed. In a log, such as that of
+a CI job, it is a line a minute: enough to see that something goes on, and what, where a job that says nothing for long
+is taken for one that hangs. Told is what is being done, what the engine counts, markings and edges, and which verdict
+is being settled by itself, with how far that is: how much is still to come nobody knows, so that a bar or a percentage,
+the alternative, would be made up.
 """
 
 from __future__ import annotations
@@ -18,38 +20,27 @@ from typing import Final, TextIO
 
 SILENT_SECONDS: Final = 1.0
 EVERY_SECONDS: Final = 0.2
+LOG_SECONDS: Final = 60.0
+"""How often a log is told of what nobody asked to be told, and of what is as it was."""
+_LOOK_SECONDS: Final = 0.2
 
 
-class _Line:
-    """A line that is written over itself, and wiped in the end."""
+class ProgressLine:
+    """Writes what is being done and how far it is: over itself on a terminal, else line by line; for any thread.
 
-    def __init__(self, stream: TextIO, clock: Callable[[], float]) -> None:
+    Where nobody `wanted` it, a log hears of it once a minute.
+    """
+
+    def __init__(self, stream: TextIO, clock: Callable[[], float] = monotonic, *, wanted: bool = True) -> None:
         self._stream = stream
         self._clock = clock
-        self._began = clock()
-        self._width = 0
-
-    def _write(self, line: str) -> None:
-        line = line[: get_terminal_size().columns - 1]  # the rest of a broken line could not be wiped
-        self._stream.write(f"\r{line.ljust(self._width)}")
-        self._stream.flush()
-        self._width = len(line)
-
-    def wipe(self) -> None:
-        """Take the line off the terminal."""
-        if self._width:
-            self._stream.write(f"\r{' ' * self._width}\r")
-            self._stream.flush()
-            self._width = 0
-
-
-class ProgressLine(_Line):
-    """Writes how many markings and edges were found: over itself on a terminal, else line by line; for any thread."""
-
-    def __init__(self, stream: TextIO, clock: Callable[[], float] = monotonic) -> None:
-        super().__init__(stream, clock)
         self._is_terminal = stream.isatty()
-        self._next = self._began + SILENT_SECONDS
+        self._seldom = not (self._is_terminal or wanted)
+        self._began = clock()
+        self._next = self._began + (LOG_SECONDS if self._seldom else SILENT_SECONDS)
+        self._again = self._next
+        self._doing = self._words = self._told = ""
+        self._width = 0
         self._turn = Lock()
 
     def __call__(self, n_markings: int, n_edges: int) -> None:
@@ -59,67 +50,71 @@ class ProgressLine(_Line):
     def say(self, words: str) -> None:
         """Tell in words how far it is."""
         with self._turn:
-            now = self._clock()
-            if now < self._next:
-                return
-            self._next = now + (EVERY_SECONDS if self._is_terminal else 10 * EVERY_SECONDS)
-            line = f"  {words}, {now - self._began:.0f} s"
-            if self._is_terminal:
-                self._write(line)
-            else:
-                self._stream.write(f"{line}\n")
-                self._stream.flush()
+            self._words = words
+            self._tell(self._next)
 
-
-@contextmanager
-def progress_line(wanted: bool | None) -> Generator[ProgressLine | None]:
-    """A line for the work of this block; None where it is not wanted, or by default where nobody would see it."""
-    if not (sys.stderr.isatty() if wanted is None else wanted):
-        yield None
-        return
-    line = ProgressLine(sys.stderr)
-    try:
-        yield line
-    finally:
-        line.wipe()
-
-
-class Stages(_Line):
-    """Writes what is being done and for how long, where the work itself counts nothing: over itself, on a terminal."""
-
-    def __init__(self, stream: TextIO, clock: Callable[[], float] = monotonic) -> None:
-        super().__init__(stream, clock)
-        self._words = ""
-
-    def __call__(self, words: str) -> None:
+    def begins(self, doing: str) -> None:
         """Say what is done from now on."""
-        self._words = words
+        with self._turn:
+            self._doing, self._words = doing, ""
 
     def tell(self) -> None:
-        """Write the line, once a second has gone by."""
-        seconds = self._clock() - self._began
-        if seconds < SILENT_SECONDS or not self._words:
+        """Tell what was said last, where it is time to: a log is told again of what is as it was only once a minute."""
+        with self._turn:
+            self._tell(self._again if self._said == self._told else self._next)
+
+    @property
+    def _said(self) -> str:
+        return ": ".join(filter(None, (self._doing, self._words)))
+
+    def _tell(self, due: float) -> None:
+        now, words = self._clock(), self._said
+        if not words or now < due:
             return
-        self._write(f"  {self._words}, {seconds:.0f} s")
+        self._told = words
+        self._next = now + (EVERY_SECONDS if self._is_terminal else LOG_SECONDS if self._seldom else 10 * EVERY_SECONDS)
+        self._again = now + (EVERY_SECONDS if self._is_terminal else LOG_SECONDS)
+        line = f"  {words}, {now - self._began:.0f} s"
+        if self._is_terminal:
+            line = line[: get_terminal_size().columns - 1]  # the rest of a broken line could not be wiped
+            self._stream.write(f"\r{line.ljust(self._width)}")
+            self._width = len(line)
+        else:
+            self._stream.write(f"{line}\n")
+        self._stream.flush()
+
+    def wipe(self) -> None:
+        """Take the line off the terminal."""
+        if self._width:
+            self._stream.write(f"\r{' ' * self._width}\r")
+            self._stream.flush()
+            self._width = 0
 
 
 @contextmanager
-def stages() -> Generator[Callable[[str], object]]:
-    """What tells the stages of the work of this block: a line on a terminal, and nothing elsewhere."""
-    if not sys.stderr.isatty():
-        yield lambda _: None
+def progress_line(wanted: bool | None = None) -> Generator[ProgressLine | None]:
+    """A line for the work of this block; None where it is not wanted, and once a minute where nobody said."""
+    if wanted is False:
+        yield None
         return
-    line, over = Stages(sys.stderr), Event()
+    line, over = ProgressLine(sys.stderr, wanted=bool(wanted)), Event()
 
-    def write() -> None:
-        while not over.wait(EVERY_SECONDS):
+    def look() -> None:
+        while not over.wait(_LOOK_SECONDS):
             line.tell()
 
-    writer = Thread(target=write, daemon=True)
-    writer.start()
+    looking = Thread(target=look, daemon=True)
+    looking.start()
     try:
         yield line
     finally:
         over.set()
-        writer.join()
+        looking.join()
         line.wipe()
+
+
+@contextmanager
+def stages() -> Generator[Callable[[str], object]]:
+    """What tells the stages of the work of this block, where the work itself counts nothing."""
+    with progress_line() as line:
+        yield line.begins if line is not None else lambda _: None

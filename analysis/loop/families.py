@@ -155,15 +155,16 @@ def answers(
     budget: Budget | None = None,
     *,
     progress: Callable[[int, int], object] | None = None,
+    tell: Callable[[str], object] | None = None,
     interrupted: Event | None = None,
 ) -> Answered:
-    """Ask each family of a loop, with `progress` and `interrupted` of `check`; raises `InputError` as it does.
+    """Ask each family of a loop, with `progress`, `tell` and `interrupted` of `check`; raises `InputError` as it does.
 
     Nothing else is asked of its net: whether a machine can be stopped, or every variant is live, is no question there.
     """
     families = tuple(families)
     net = replace(loop.net, properties=tuple(prop for family in families for prop in family.of.values()))
-    report = check(net, budget=budget, of_the_net=False, progress=progress, interrupted=interrupted)
+    report = check(net, budget=budget, of_the_net=False, progress=progress, tell=tell, interrupted=interrupted)
     return Answered(loop, families, (), report).doubting(())
 
 

@@ -89,20 +89,24 @@ def ask_faults(
     budget: Budget | None = None,
     live: tuple[str, ...] | None = None,
     *,
+    begins: Callable[[str], object] = lambda _: None,
     progress: Callable[[int, int], object] | None = None,
+    tell: Callable[[str], object] | None = None,
     interrupted: Event | None = None,
 ) -> FaultsAsked:
     """Ask what the faults that the plant file declares do to a cell; `asked` are the answers without faults.
 
     `live` are the transitions that a fault can take something of, unless somebody knows better those that may be live.
-    `progress` and `interrupted` are those of `check`.
+    `begins` is told what is asked from then on; `progress`, `tell` and `interrupted` are those of `check`.
     """
     net, live = asked.loop.cell, live_in(asked) if live is None else live
     for_good, repaired = close(net, model, Faults.FOR_GOOD), close(net, model, Faults.REPAIRED)
     # Of a cell in which nothing is live, a fault takes nothing, and repair cannot give it back.
     recoveries = [_recovery(repaired, machine, live) for machine in repaired.failed] if live else []
-    ask = partial(answers, budget=budget, progress=progress, interrupted=interrupted)
+    ask = partial(answers, budget=budget, progress=progress, tell=tell, interrupted=interrupted)
+    begins("the cell of which a machine fails for good")
     lasting = ask(for_good, _for_good(for_good, live)) if for_good.failed else None
+    begins("the cell of which a machine is repaired")
     mended = ask(repaired, recoveries) if recoveries else None
     # Of what only may be live, nobody knows whether it is the fault that it cannot fire again.
     doubted = set(live).difference(known_live(asked))

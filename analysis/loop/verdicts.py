@@ -110,22 +110,27 @@ def check_loop(
     model: PlantModel,
     budget: Budget | None = None,
     *,
+    begins: Callable[[str], object] = lambda _: None,
     progress: Callable[[int, int], object] | None = None,
+    tell: Callable[[str], object] | None = None,
     interrupted: Event | None = None,
 ) -> LoopReport:
     """Decide every verdict on a net with the machines of a plant, and compare it with gates free.
 
-    `progress` and `interrupted` are those of `check`. Raises `InputError` as `close` does, and as `check` does.
+    `begins` is told what is asked from then on; `progress`, `tell` and `interrupted` are those of `check`. Raises
+    `InputError` as `close` does, and as `check` does.
 
     >>> from firable.nets.catalogue import catalogue_net, catalogue_plant
     >>> report = check_loop(catalogue_net("one_robot"), catalogue_plant("one_robot"))
     >>> report.closed.figures.markings, str(report.status), any(one.differs for one in report.differences)
     (746, 'proved', False)
     """
-    asked = ask_loop(net, model, budget, progress=progress, interrupted=interrupted)
+    begins("the cell with its machines")
+    asked = ask_loop(net, model, budget, progress=progress, tell=tell, interrupted=interrupted)
     unclear = (_not_asked(of) for of in net.properties if _unclear(model, of))
     verdicts = (*asked.verdicts, *unclear)
-    opened = check(net, budget=budget, progress=progress, interrupted=interrupted)
+    begins("the cell with gates free")
+    opened = check(net, budget=budget, progress=progress, tell=tell, interrupted=interrupted)
     return LoopReport(asked, verdicts, tuple(_differences(verdicts, opened)), opened)
 
 
@@ -135,15 +140,17 @@ def ask_loop(
     budget: Budget | None = None,
     *,
     progress: Callable[[int, int], object] | None = None,
+    tell: Callable[[str], object] | None = None,
     interrupted: Event | None = None,
 ) -> Answered:
     """Ask everything of a net with the machines of a plant, but for properties of which the answer would be empty.
 
-    `progress` and `interrupted` are those of `check`. Raises `InputError` as `close` does, and as `check` does.
+    `progress`, `tell` and `interrupted` are those of `check`. Raises `InputError` as `close` does, and as `check` does.
     """
     loop = close(net, model)
     of_the_file = (_family_of(loop, of) for of in net.properties if not _unclear(model, of))
-    return answers(loop, (*_families(loop), *of_the_file), budget, progress=progress, interrupted=interrupted)
+    families = (*_families(loop), *of_the_file)
+    return answers(loop, families, budget, progress=progress, tell=tell, interrupted=interrupted)
 
 
 def live_in(asked: Answered) -> tuple[str, ...]:

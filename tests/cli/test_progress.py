@@ -5,6 +5,7 @@ import re
 import signal
 from collections.abc import Callable
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import pytest
@@ -12,7 +13,7 @@ import pytest
 import firable.analysis.check
 from firable.analysis.spaces import reachability
 from firable.cli.main import main
-from firable.cli.progress import ProgressLine, Stages, progress_line, stages
+from firable.cli.progress import ProgressLine, progress_line, stages
 
 
 class Terminal(io.StringIO):
@@ -58,15 +59,49 @@ def test_a_log_gets_whole_lines_and_fewer() -> None:
     assert log.getvalue() == "  10 markings, 20 edges, 1 s\n  10 markings, 20 edges, 3 s\n"
 
 
-def test_by_default_the_line_is_for_terminals(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_log_hears_of_what_is_as_it_was_once_a_minute() -> None:
+    clock, log = Clock(), io.StringIO()
+    line = ProgressLine(log, clock)
+    line.begins("this")
+    for clock.now_seconds in (1.0, 4.0, 60.9, 61.0):
+        line.tell()
+    line.say("that")
+    clock.now_seconds = 63.0
+    line.tell()
+    assert log.getvalue() == "  this, 1 s\n  this, 61 s\n  this: that, 63 s\n"
+
+
+def test_a_log_hears_of_what_nobody_asked_to_be_told_once_a_minute() -> None:
+    clock, log = Clock(), io.StringIO()
+    line = ProgressLine(log, clock, wanted=False)
+    line.begins("this")
+    for clock.now_seconds in (1.0, 59.9, 60.0, 90.0, 119.9, 120.0):
+        line(round(clock.now_seconds), 0)
+    line.wipe()
+    assert log.getvalue() == "  this: 60 markings, 0 edges, 60 s\n  this: 120 markings, 0 edges, 120 s\n"
+    clock.now_seconds = 200.0
+    ProgressLine(log, clock, wanted=False).tell()
+    assert log.getvalue().count("\n") == 2, "nothing was said of what is done"
+
+
+def test_by_default_a_line_at_once_is_for_terminals(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("firable.cli.progress.SILENT_SECONDS", 0.0)
     for stream, shown in ((Terminal(), True), (io.StringIO(), False)):
         monkeypatch.setattr("sys.stderr", stream)
-        with progress_line(None) as line:
-            assert (line is not None) == shown
+        for wanted in (None, True):
+            with progress_line(wanted) as line:
+                assert line is not None
+                line.say("something")
+                assert ("something" in stream.getvalue()) == (shown or wanted is True)
         with progress_line(wanted=False) as line:
             assert line is None
-        with progress_line(wanted=True) as line:
-            assert line is not None
+
+
+def test_a_line_is_told_again_while_nothing_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    told = Event()
+    monkeypatch.setattr(ProgressLine, "tell", lambda _: told.set())
+    with progress_line(wanted=True):
+        assert told.wait(60)
 
 
 def test_a_long_check_tells_how_far_it_is_and_the_report_is_the_same(
@@ -104,8 +139,14 @@ def test_a_check_with_machines_tells_how_far_it_is_too(
     cell = "catalogue:one_robot"
     assert main(["check", cell, "--machines", cell, "--progress"]) == 0
     told = capsys.readouterr()
-    assert re.findall(r"(\d+) markings, 0 edges", told.err) == [str(n) for n in explored]
-    assert len(explored) == 4, "the loop, the net with gates free, and the loop with faults for good and repaired"
+    said = (
+        "the cell with its machines: 0 markings",
+        "the cell with gates free: 1 markings",
+        "the cell of which a machine fails for good: 2 markings",
+        "the cell of which a machine is repaired: 3 markings",
+    )
+    assert re.findall(r"^  (.*, 0 edges), \d+ s$", told.err, re.MULTILINE) == [f"{one}, 0 edges" for one in said]
+    assert len(explored) == 4
     assert main(["check", cell, "--machines", cell, "--no-progress"]) == 0
     silent = capsys.readouterr()
     assert (silent.out, silent.err) == (told.out, "")
@@ -113,13 +154,13 @@ def test_a_check_with_machines_tells_how_far_it_is_too(
 
 def test_stages_tell_what_is_done_and_for_how_long_and_are_wiped() -> None:
     clock, terminal = Clock(), Terminal()
-    line = Stages(terminal, clock)
-    line("Eq. (7)")
+    line = ProgressLine(terminal, clock)
+    line.begins("Eq. (7)")
     clock.now_seconds = 0.9
     line.tell()
     assert terminal.getvalue() == ""
     for clock.now_seconds, words in ((1.0, "arbitration"), (2.0, "O2")):
-        line(words)
+        line.begins(words)
         line.tell()
     assert terminal.getvalue() == f"\r  arbitration, 1 s\r{'  O2, 2 s'.ljust(18)}"
     line.wipe()
@@ -127,23 +168,32 @@ def test_stages_tell_what_is_done_and_for_how_long_and_are_wiped() -> None:
     assert terminal.getvalue().endswith(f"\r{' ' * len('  O2, 2 s')}\r")
 
 
+def test_what_was_said_of_one_stage_is_not_said_of_the_next() -> None:
+    clock, terminal = Clock(), Terminal()
+    line = ProgressLine(terminal, clock)
+    line.begins("the loop")
+    clock.now_seconds = 1.0
+    line(7, 8)
+    clock.now_seconds = 2.0
+    line.begins("its faults")
+    line.tell()
+    first = "  the loop: 7 markings, 8 edges, 1 s"
+    assert terminal.getvalue() == f"\r{first}\r{'  its faults, 2 s'.ljust(len(first))}"
+
+
 def test_a_stage_of_many_words_is_one_line_of_a_narrow_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "20")
     clock, terminal = Clock(), Terminal()
-    line = Stages(terminal, clock)
-    line("what is said of this stage is long")
+    line = ProgressLine(terminal, clock)
+    line.begins("what is said of this stage is long")
     clock.now_seconds = 2.0
     line.tell()
     assert terminal.getvalue() == f"\r{'  what is said of this stage'[:19]}", "what is broken could not be wiped"
 
 
-def test_stages_are_for_terminals(monkeypatch: pytest.MonkeyPatch) -> None:
-    for stream, shown in ((Terminal(), True), (io.StringIO(), False)):
-        monkeypatch.setattr("sys.stderr", stream)
-        with stages() as begins:
-            assert isinstance(begins, Stages) == shown
-            begins("anything")
-        assert stream.getvalue() == ""
+def test_stages_are_told_by_the_line() -> None:
+    with stages() as begins:
+        assert begins.__func__ is ProgressLine.begins  # type: ignore[attr-defined]  # a bound method
 
 
 NET = "catalogue:conceptual_one_robot"
