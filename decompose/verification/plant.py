@@ -325,13 +325,19 @@ class Things:
     def told_late(self, changes: Collection[tuple[str, bool]], places: Collection[Place] = ()) -> set[str]:
         """Of signals that change to these values, those by whose old value a gate may be open, and somebody ready: not
         one who cannot be before the completion of a command of `places` is told, which are sent then, or done. Then the
-        completion, too, which is told behind them."""
+        completion, too, which is told behind them. What is set from outside could have been set later."""
         late = {
             signal
             for signal, value in changes
-            if (signal, not value) in self.read and not any(self.excludes(p, signal, not value) for p in places)
+            if (signal, not value) in self.read
+            and not self.may_wait(signal)
+            and not any(self.excludes(p, signal, not value) for p in places)
         }
         return late | {signal for signal, _ in changes if late and signal in self.completions}
+
+    def may_wait(self, signal: str) -> bool:
+        """Whether somebody outside sets a signal, who may do so when the controller is told as well as before."""
+        return signal in self.model.sensors and self.model.sensors[signal].set_by is not None
 
     @cached_property
     def told_before(self) -> dict[str, list[str]]:

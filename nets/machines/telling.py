@@ -18,6 +18,10 @@ that does. What only opens gates is told in the instant itself: who fires later 
 changes as a command is sent or done, where nobody who goes by the old value can be ready until the completion is told,
 which comes behind it (`excluding.py`).
 
+What is set from outside is told in the instant, whichever gate it closes: it may change at any time, whatever the cell
+does, and nothing but gates goes by it. So what its controller is told late could have been set late, and whoever waits
+until all is told is never kept waiting by it for good.
+
 Rejected: to tell what closes a gate in the instant, too, where no sensor opens another one, as who fires before it is
 told could have fired before the instant. The instant can be a firing of the cell, where a conveyor takes its workpiece:
 who waits for the token that it leaves could not. And a command means something else before: a stop that comes when the
@@ -69,6 +73,11 @@ class Telling:
         return frozenset(one.name for one in self.laws.net.signals if one.kind is SignalKind.COMPLETION)
 
     @cached_property
+    def from_outside(self) -> frozenset[str]:
+        """The signals that somebody outside may set, and reset, at any time."""
+        return frozenset(name for name, sensor in self.laws.model.sensors.items() if sensor.set_by is not None)
+
+    @cached_property
     def late(self) -> tuple[str, ...]:
         """The signals that are told late in some firing, in the order of the net."""
         by_commands = ((changes, (place,)) for place in self.laws.commanding for changes in self._by(place))
@@ -83,12 +92,14 @@ class Telling:
         return Excluding(self.laws)
 
     def told_late(self, changes: Collection[Change], places: Collection[Place] = ()) -> frozenset[str]:
-        """Which of some signals that change together are told late: those that each close a gate, and completions
-        behind them. `places` are those whose commands are sent then, or the one whose command is done."""
+        """Which of some signals that change together are told late: those that each close a gate and are not set from
+        outside, and completions behind them. `places` are those whose commands are sent then, or the one whose command
+        is done."""
         closing = {
             signal
             for signal, value in changes
             if (signal, not value) in self.wanted
+            and signal not in self.from_outside
             and not any(self.excluding.excludes(place, signal, value=not value) for place in places)
         }
         behind = {signal for signal, _ in changes if closing and signal in self.completions}

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from itertools import count
 from random import Random
 
 import pytest
 from support import inspected_cell, rejecting_cell
 from support.bench_cell import COMMANDS, JUDGED, PLANT, bench, free_cell
+from support.drawn_cells import drawn_cell
 from support.examples import seeds
 
 from firable.analysis.check import check
@@ -20,6 +22,7 @@ from firable.nets.formula import Deadlock, parse_formula
 from firable.nets.machines.closing import close
 from firable.nets.machines.loop import Faults
 from firable.nets.machines.plant_file import PlantModel, parse_plant
+from firable.nets.machines.telling import Telling
 from firable.nets.net import ExternalGate, Net, Property, PropertyKind, TemporalProperty, Transition
 from firable.nets.temporal import Logic, parse_temporal
 from firable.nets.text import parse_net
@@ -532,6 +535,23 @@ def test_of_a_fault_it_is_told_what_is_not_known_of_it() -> None:
 
 
 # --- Any net
+
+
+@pytest.mark.seeds
+@pytest.mark.parametrize("seed", seeds(3))
+def test_that_something_is_set_from_outside_could_be_told_late_and_nothing_else_would_come_of_it(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cells = (drawn_cell(each) for each in count(1_000 * seed) if "set_by" in drawn_cell(each).plant_text)
+    told = ((cell, close(cell.net, cell.plant)) for cell in cells)
+    cell, loop = next((c, one) for c, one in told if explore(one.net, budget=Budget(markings=2_000)).complete)
+    at_once = ask_loop(cell.net, cell.plant)
+    monkeypatch.setattr(Telling, "from_outside", frozenset())
+    late = ask_loop(cell.net, cell.plant)
+    assert len(late.loop.net.places) >= len(loop.net.places)
+    for family in at_once.families:
+        now, then = at_once.of(family), late.of(family)
+        assert {of: one.status for of, one in now.items()} == {of: one.status for of, one in then.items()}, cell
 
 
 @pytest.mark.seeds

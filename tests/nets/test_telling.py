@@ -209,7 +209,7 @@ def read(where: str, gate: str, sensor: str, saw: str = "") -> tuple[Net, PlantM
         ("END", "unless: belt.one", "{passes: table}", ["belt.one"]),
         ("END", "if: belt.one", "{passes: table}", []),
         ("END", "leaves if: belt.one", "{fails: table}", ["belt.one"]),
-        ("END", "unless: belt.one", "{set_by: operator}", ["belt.one"]),
+        ("END", "unless: belt.one", "{set_by: operator}", []),
         ("END", "if: belt.one", "{acknowledges: B}", ["belt.one"]),
     ],
 )

@@ -122,8 +122,10 @@ class PhysicalCell(Plant):
         return {f"restless {name}": after[f"at {name}"] is not None for name in given}
 
     def marking(self, state: State) -> frozenset[str]:
-        """The places of the loop that hold a token then."""
-        return frozenset(places[state[thing]] for thing, places in self.things.items() if state[thing] in places)
+        """The places of the loop that hold a token then; of what is set from outside they say what has arrived."""
+        outside = {name for name, sensor in self.model.sensors.items() if sensor.set_by is not None}
+        known = {**state, **{f"set {name}": state[f"arrived {name}"] for name in outside}}
+        return frozenset(places[known[thing]] for thing, places in self.things.items() if known[thing] in places)
 
     def runs(self, states_max: int) -> tuple[dict[frozenset[str], tuple[str, ...]], bool]:
         """The markings that so many states have, each with a shortest run to it; and whether those are all states."""
