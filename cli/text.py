@@ -166,6 +166,8 @@ def _reasons(net: Net, verdict: Verdict, told: dict[tuple[object, ...], str], *,
             return
     if verbose and verdict.method != NOTHING:
         yield f"by {verdict.method}{_cost(verdict.cost)}"
+    if status == "proved" and verdict.hint:
+        yield verdict.hint
     if status == "unknown" and verdict.bound:
         yield f"reached: {verdict.bound}"
     if status == "violated" and verdict.subjects:

@@ -197,7 +197,7 @@ def starvation_free(behaviour: Behaviour[Any]) -> Verdict:
         late = only_after_a_timeout(space.net)
         hungry = starved(run, (name for name in behaviour.live if name not in late))
         if not hungry:
-            return yes()
+            return yes() if behaviour.live else NONE_STARVES
         return no(hungry, _witness(space.net, space.discipline, run, f"{hungry[0]} never fires in the cycle"))
 
     return STARVATION.ask(behaviour.space, find)

@@ -120,6 +120,16 @@ def test_where_no_transition_is_live_none_starves_even_if_no_run_has_all_gates_o
     assert (verdict.status, verdict.hint) == (Status.PROVED, "no transition is live, so none starves")
 
 
+@pytest.mark.parametrize("ends", [True, False])
+def test_where_no_transition_is_live_it_is_said_that_none_starves_for_that(ends: bool) -> None:
+    places = (Place("p", marked=True), Place("q"), Place("r"))
+    there = Transition("t", ("p",), ("q",))
+    once = Net("n", places, (there, Transition("u", ("q",), ("r",))))
+    again = Net("n", places, (there, Transition("u", ("q",), ("p",))))
+    verdict = check(once if ends else again).verdict("starvation")
+    assert (verdict.status, verdict.hint) == (Status.PROVED, "no transition is live, so none starves" if ends else "")
+
+
 def test_a_run_that_is_cut_off_says_so() -> None:
     run = eager_run(two_ways(), steps_max=1)
     assert run == EagerRun((("t1",),), (), complete=False)

@@ -512,3 +512,11 @@ def test_what_fails_before_anything_fires_is_not_told_by_the_firings_of_another(
 def test_the_package_is_run_as_the_command_is() -> None:
     told = subprocess.run([sys.executable, "-m", "firable", "--version"], capture_output=True, text=True, check=True)
     assert told.stdout.startswith("firable ")
+
+
+def test_what_is_proved_because_there_is_nothing_of_the_kind_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", "catalogue:one_robot_mc_late"]) == 1
+    told = capsys.readouterr().out
+    assert re.search(r"✓ proved +starvation .*\n      no transition is live, so none starves\n", told)
+    assert main(["check", "catalogue:one_robot"]) == 0
+    assert "none starves" not in capsys.readouterr().out
