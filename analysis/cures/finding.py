@@ -42,10 +42,11 @@ from firable.analysis.temporal.queries import answer
 from firable.analysis.verdicts.goals import goals_of
 from firable.nets.changes import Change, Gate, arbitration, capacity, changed
 from firable.nets.diagnostics import InputError
-from firable.nets.formula import Or
+from firable.nets.formula import Formula, Or
 from firable.nets.net import Net, Property, PropertyKind
 from firable.nets.queries import Query
-from firable.nets.verdict import Cure, Status, Verdict, Weight
+from firable.nets.rules import hints_of
+from firable.nets.verdict import Cure, Status, Verdict, Weight, spelled
 from firable.semantics.conflict import conflicts
 from firable.semantics.player import Player
 from firable.semantics.trace import Discipline
@@ -72,12 +73,17 @@ def explained(report: CheckReport, queries: Sequence[Query] = ()) -> tuple[Verdi
     """The verdicts of a report; deadlocks with who waits for whom, violated ones with the changes that cure them.
 
     `queries` are those that the report answers. Cures are looked for where all markings are known and at most
-    `MARKINGS_MAX`, under interleaving, and the budget of the report has room for what is asked of them.
+    `MARKINGS_MAX`, under interleaving, and the budget of the report has room for what is asked of them. Where there are
+    more, the hint says that none was looked for.
     """
     told = tuple(with_circle(report.net, verdict) for verdict in report.verdicts)
     space = report.space
-    if report.discipline is not Discipline.INTERLEAVING or not space.complete or space.n_markings > MARKINGS_MAX:
+    if report.discipline is not Discipline.INTERLEAVING or not space.complete:
         return told
+    if space.n_markings > MARKINGS_MAX:
+        none = f"no cure was looked for, as {spelled(space.n_markings)} markings are more than {MARKINGS_MAX:,}"
+        sought = (_is_to_be_cured(verdict) and _has_kinds(space.net, verdict.name) for verdict in told)
+        return tuple(_with_hint(one, none) if is_sought else one for one, is_sought in zip(told, sought, strict=True))
     try:
         search = _Search(space, {verdict.name: verdict for verdict in told}, queries)
     except BudgetExceeded:
@@ -193,9 +199,8 @@ class _Search(Generic[S]):
         space, algebra = self._space, self._space.algebra
         if verdict.name == "deadlock-free":
             return self._without_start(algebra.negation(space.endless()))
-        of = next((of for of in self._net.properties if f"property.{of.name}" == verdict.name), None)
-        if isinstance(of, Property) and of.kind is PropertyKind.ALWAYS_POSSIBLE:
-            return self._without_start(algebra.negation(space.backward(space.satisfying(of.formula))))
+        if (restored := _restored(self._net, verdict.name)) is not None:
+            return self._without_start(algebra.negation(space.backward(space.satisfying(restored))))
         asked = goals_of(self._net, verdict.name)
         if asked is None or any(goal.wanted for goal in asked[1]):
             return None
@@ -364,6 +369,25 @@ def _is_to_be_cured(verdict: Verdict) -> bool:
     if verdict.status is not Status.VIOLATED:
         return False
     return verdict.weight is Weight.REQUIRED or (verdict.weight is Weight.WARNING and verdict.name in _CURED_WARNINGS)
+
+
+def _has_kinds(net: Net, name: str) -> bool:
+    """Whether there are changes to try for a verdict: it wants an arbiter, or that markings are avoided."""
+    if name in {"deadlock-free", "effective-conflicts"} or _restored(net, name) is not None:
+        return True
+    asked = goals_of(net, name)
+    return asked is not None and not any(goal.wanted for goal in asked[1])
+
+
+def _restored(net: Net, name: str) -> Formula | None:
+    """What must be reached again and again by the property that a verdict is on; None where it says something else."""
+    of = next((of for of in net.properties if f"property.{of.name}" == name), None)
+    return of.formula if isinstance(of, Property) and of.kind is PropertyKind.ALWAYS_POSSIBLE else None
+
+
+def _with_hint(verdict: Verdict, more: str) -> Verdict:
+    """A verdict with something more to be told behind its hint, or behind that of its rule."""
+    return replace(verdict, hint="; ".join((*(hint for _, hint in hints_of(verdict)), more)))
 
 
 def _fired(space: StateSpace[Any]) -> set[int]:

@@ -25,6 +25,7 @@ from firable.nets.editing import edits
 from firable.nets.net import Arbiter, Net, Place, Transition
 from firable.nets.printing import format_net, in_file_order
 from firable.nets.queries import Query, parse_query
+from firable.nets.rules import hints_of
 from firable.nets.source import Source
 from firable.nets.text import parse_net
 from firable.nets.verdict import Cure, Status, Verdict, Weight, Witness
@@ -121,6 +122,32 @@ def test_a_changed_net_that_has_no_room_is_no_cure_and_no_error(monkeypatch: pyt
 
     monkeypatch.setattr("firable.analysis.cures.finding.explore", full)
     assert not _explained(catalogue_net("one_robot_mc_late"))["deadlock-free"].cures
+
+
+DEAD: Final = Transition("dead", ("robot.free", "conveyor.cv1"), permissive=("conveyor.cv1_wait",))
+"""Fires in no marking of the late cell."""
+
+
+def test_it_is_said_where_there_are_too_many_markings_for_a_cure(monkeypatch: pytest.MonkeyPatch) -> None:
+    def told() -> dict[str, Verdict]:
+        return {verdict.name: verdict for verdict in explained(check(catalogue_net("one_robot_mc_late")))}
+
+    before = told()
+    monkeypatch.setattr("firable.analysis.cures.finding.MARKINGS_MAX", 76)
+    assert told() == before, "the net has so many"
+    monkeypatch.setattr("firable.analysis.cures.finding.MARKINGS_MAX", 75)
+    after = told()
+    none = "no cure was looked for, as 76 markings are more than 75"
+    for name in ("deadlock-free", "property.restart"):
+        ((_, hint),) = hints_of(before[name])
+        assert before[name].cures
+        assert (after[name].hint, after[name].cures) == (f"{hint}; {none}", ())
+    assert after["live"].hint == before["live"].hint, "a warning, which no cure is looked for"
+    assert not any(none in verdict.hint for verdict in after.values() if verdict.holds)
+    late = catalogue_net("one_robot_mc_late")
+    dead = replace(late, transitions=(*late.transitions, DEAD))
+    (found,) = (verdict for verdict in explained(check(dead)) if verdict.name == "quasi-live")
+    assert none not in found.hint, "no change of ours would bring it to life"
 
 
 def test_all_changes_of_a_cure_make_one_net(monkeypatch: pytest.MonkeyPatch) -> None:
