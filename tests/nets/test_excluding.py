@@ -130,6 +130,29 @@ def test_who_reads_the_place_and_waits_for_no_completion_is_not_excluded() -> No
     assert not excluded(found, "press.door", value=False)
 
 
+@pytest.mark.parametrize(
+    ("arcs", "expected"),
+    [
+        ("if: press.working, from: press.spare, to: press.seen, unless: press.door", False),
+        ("if: [press.working, press.worked], from: press.spare, to: press.seen, unless: press.door", True),
+        ("from: press.spare, to: press.seen, unless: [press.working, press.door]", True),
+        ("from: press.spare, to: press.working, unless: press.door", True),
+        ("from: press.spare, to: press.seen, unless: press.door", False),
+        ("if: press.ready, from: press.spare, to: press.seen, unless: press.door", True),
+        ("if: press.door, from: press.spare, to: press.seen", True),
+    ],
+)
+def test_who_goes_by_a_signal_beside_a_command_is_excluded_by_what_it_wants_of_the_place(
+    arcs: str, expected: bool
+) -> None:
+    text = TEXT.replace("start: ready", "start: [ready, spare]").replace(
+        "done:\n", "done:\n      spare:\n      seen:\n"
+    )
+    text = text.replace("again: {from: press.done, to: press.ready, unless: press.door}", f"again: {{{arcs}}}")
+    found = excluding_of(f"{text}  back: {{from: press.done, to: press.ready}}\n", "if: press.part")
+    assert excluded(found, "press.door", value=False) == expected
+
+
 def test_every_command_of_the_untimed_cell_of_the_catalogue_is_announced_and_nothing_told_late() -> None:
     laws = Laws(catalogue_plant("one_robot"), net := catalogue_net("one_robot"))
     assert Excluding(laws).announced == {p.name for p in net.places if p.completion is not None}
