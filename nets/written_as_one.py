@@ -26,6 +26,8 @@ _WAYS_MAX: Final = 4
 _AND: Final = re.compile(r"&+|(?<![^\s()])and(?![^\s()])", re.IGNORECASE)
 _OR: Final = re.compile(r"\|+|(?<![^\s()])or(?![^\s()])", re.IGNORECASE)
 _NOT: Final = re.compile(r"(?<![^\s(\[,;&|])(?:[!~/-]|not(?![^\s(]))", re.IGNORECASE)
+_MARKED: Final = re.compile(r"(?<![^\s(\[,;&|])[/-]")
+"""A negation only before what is known: a name may begin so."""
 _VALUE: Final = re.compile(
     r"(?P<name>[^\s()\[\],;&|!~=<>]+)\s*(?P<sign>==?|!=|<>|\bis\s+not\b|\bis\b)\s*"
     r"(?P<value>[01]|true|false|on|off|high|low)(?=$|[\s()\[\],;&|])",
@@ -56,8 +58,8 @@ def is_one_name(text: str) -> bool:
 
 
 def meant_by(text: str, known: Sequence[str]) -> str:
-    """The start of a hint that names the closest known name, for a text that looks like one name."""
-    return did_you_mean(text, known) if is_one_name(text) else ""
+    """The start of a hint that names the closest known name, for a text that looks like one name, and denies none."""
+    return did_you_mean(text, known) if is_one_name(text) and text[:1] not in {"-", "/"} else ""
 
 
 def _list(text: str, known: Collection[str], key: str) -> str:
@@ -77,6 +79,8 @@ def _condition(text: str, known: Collection[str], key: str) -> str:
     if formula is None or formula == Holds(text):
         return ""
     names = [atom.place for atom in names_in(formula) if isinstance(atom, Holds)]
+    if _MARKED.search(text) and not {_full(name, known) for name in names} <= {*known}:
+        return ""
     ways = list(dict.fromkeys(_ways(formula, is_wanted=key == "if"))) if len(names) <= _NAMES_MAX else []
     written = [
         ", ".join(

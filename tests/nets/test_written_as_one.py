@@ -53,6 +53,7 @@ def test_the_cell_of_these_tests_is_well_formed_as_it_stands() -> None:
         ('if: "!a.s"', "unless: a.s"),
         ("if: ~a.s", "unless: a.s"),
         ("if: -a.s", "unless: a.s"),
+        ("if: /s", "unless: a.s"),
         ("if: [a.t, not a.s]", "unless: a.s"),
         ("if: a.s = 0", "unless: a.s"),
         ("if: a.s=0", "unless: a.s"),
@@ -122,7 +123,9 @@ def test_an_arc_with_a_condition_is_sent_to_the_gates(source: str) -> None:
     assert hint.startswith("an arc has no condition, gates have: write `if` or `unless`")
 
 
-@pytest.mark.parametrize("gate", ["if: no a.s", "if: a.s xor", "if: not_a.s", "if: a.not_s", "if: a.s=low?"])
+@pytest.mark.parametrize(
+    "gate", ["if: no a.s", "if: a.s xor", "if: /part/there", "if: -a.tt", "if: not_a.s", "if: a.not_s", "if: a.s=low?"]
+)
 def test_what_is_not_understood_gets_no_name_that_may_be_its_opposite(gate: str) -> None:
     assert hints(gate=gate) == ["declare it first, or correct the name"]
 
