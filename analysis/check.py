@@ -243,7 +243,11 @@ class _Check:
             try:
                 space = SPACES[method].load()(self.net, Limits(self.deadline, self.budget.memory_bytes, threads=2))
             except BudgetExceeded as error:
-                return _told(self._report(self._nothing()), [f"{words} gave up: {error}"])
+                said = f"{words} gave up: {error}"
+                report = self._report(self._nothing())
+                more = "allow it more time or memory, or leave out --method"
+                verdicts = [_undecided(verdict, said, more) for verdict in report.verdicts]
+                return _told(replace(report, verdicts=tuple(verdicts)), [said])
             return _told(self._report(space), [f"{words}: {_size(space)}"])
         report = self._report(self._nothing())
         knowers = {of: 1.0 for of in KNOWERS if of is method}
@@ -258,13 +262,11 @@ class _Check:
 
     def _by_one(self, verdict: Verdict, settling: Settling, words: str) -> Verdict:
         """A verdict, which says, where the one technique has not decided it, how far that has come."""
-        if verdict.status is not Status.UNKNOWN:
-            return verdict
         if (said := settling.reached.get(verdict.name)) is not None:
             more = "allow it more time, with --max-seconds, or leave out --method"
-            return replace(verdict, bound=said, hint=AGAIN if self.interrupted.is_set() else more)
+            return _undecided(verdict, said, AGAIN if self.interrupted.is_set() else more)
         why = "was not asked any more" if self.deadline.over else "does not decide it"
-        return replace(verdict, bound=f"{words} {why}", hint="leave out --method, or name another one")
+        return _undecided(verdict, f"{words} {why}", "leave out --method, or name another one")
 
     def _settling(self) -> Settling:
         return Settling(self.net, self.queries, self.budget.memory_bytes, self.interrupted, self.tell)
@@ -455,6 +457,10 @@ def _reaching(verdict: Verdict, first: ReachabilityGraph, bound: str) -> Verdict
     """A verdict that the first markings leave unknown, with the bound that was reached behind them."""
     is_left = verdict.status is Status.UNKNOWN and verdict.bound == first.bound
     return replace(verdict, bound=bound) if is_left else verdict
+
+
+def _undecided(verdict: Verdict, bound: str, hint: str) -> Verdict:
+    return replace(verdict, bound=bound, hint=hint) if verdict.status is Status.UNKNOWN else verdict
 
 
 def _told(report: CheckReport, course: Sequence[str]) -> CheckReport:

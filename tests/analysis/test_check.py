@@ -19,6 +19,7 @@ from firable.analysis.race import Contestant, Outcome
 from firable.analysis.report import CheckReport, report_on
 from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
 from firable.nets.catalogue import catalogue_net
+from firable.nets.catalogue.processes import philosophers
 from firable.nets.diagnostics import InputError
 from firable.nets.net import Net
 from firable.nets.queries import parse_query
@@ -31,6 +32,14 @@ def test_a_technique_without_synchronous_steps_refuses_them(method: Method) -> N
     with pytest.raises(InputError) as refused:
         check(catalogue_net("one_robot"), "step", method=method)
     assert [d.code for d in refused.value.diagnostics] == ["F3006"]
+
+
+def test_a_space_that_is_named_and_is_not_found_in_time_says_so_of_all_that_it_leaves_open() -> None:
+    report = check(philosophers(200), budget=Budget(seconds=0), method="symbolic")
+    left = [verdict for verdict in report.verdicts if verdict.status is Status.UNKNOWN]
+    assert {verdict.name for verdict in left} >= {"contact-free", "deadlock-free", "live"}
+    assert {verdict.bound for verdict in left} == {"decision diagram gave up: max_seconds is over"}
+    assert not any("markings" in verdict.hint for verdict in left)
 
 
 def test_few_markings_are_explored_and_nothing_else_is_tried() -> None:
