@@ -314,6 +314,9 @@ def _token_read(path: Path) -> str:
     try:
         with path.open(encoding="ascii") as opened:
             token = opened.read(_TOKEN_CHARACTERS_MAX + 1).strip()
+    except UnicodeDecodeError:
+        reason = "it has a character that is none of ASCII, such as the mark that some editors put at the beginning"
+        raise _file_refusal(path, ValueError(reason)) from None
     except (OSError, ValueError) as error:
         raise _file_refusal(path, error) from None
     if not token or not token.isprintable() or " " in token:

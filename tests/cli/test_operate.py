@@ -200,6 +200,16 @@ def test_what_is_longer_than_any_token_is_none(token: str, tmp_path: Path, capsy
     assert "error[F1001]" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_a_token_that_an_editor_has_saved_in_another_way_is_told_so(
+    encoding: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "token"
+    file.write_text(new_token(), encoding=encoding)
+    assert main(["operate", "http://127.0.0.1:9", "stop", "--token-file", str(file)]) == 2
+    assert f"error[F1001]: {file}: no token: it has a character that is none of ASCII, " in capsys.readouterr().err
+
+
 def test_who_may_operate_is_told_as_it_is_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     own = Site(tmp_path / "site").host("run")
     tls = (own.certificate, own.key)
