@@ -103,7 +103,7 @@ class _Sealing:
             unproved = verdict.weight is Weight.REQUIRED and not verdict.holds
             self.verdicts.append(verdict if unproved else _as_shown(family, records, file, self.method, verdict.hint))
             of = filter(None, (records.get(f"property.{prop.name}") for prop in family.of.values()))
-            if (why := next((record.lacking for record in of if record.lacking), "")) and not unproved:
+            if why := next((record.lacking for record in of if record.lacking), ""):
                 self.lacking[family.name] = why
         return {family.name: _shown_to_fail(family, records) for family in asked.families}
 

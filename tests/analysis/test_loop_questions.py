@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from support.bench_cell import bench
@@ -65,7 +66,7 @@ def test_what_holds_more_tokens_than_at_the_start_is_not_the_start() -> None:
     ],
 )
 def test_a_gate_that_stays_closed_is_no_matter_of_a_transition_that_waits_for_places_too(
-    arcs: dict[str, tuple[str, ...]], expected: Status
+    arcs: dict[str, Any], expected: Status
 ) -> None:
     net = parse_net(STARTING)
     closed = replace(Transition("closed", ("c.cold",)), external=(ExternalGate("c.never"),), **arcs)
