@@ -444,6 +444,11 @@ def test_an_accident_before_anything_may_fail_is_none_of_a_fault() -> None:
     report = check_loop(parse_net(HASTY), bench())
     assert report.verdict("loop.busy-machines").status is Status.VIOLATED
     assert faults_of(parse_net(HASTY), bench())["fault.safe"] is Status.PROVED
+    old = "UNCLAMP: {does: release, station: table, takes_s: 1}"
+    assert old in PLANT
+    plant = parse_plant(PLANT.replace(old, f"{old[:-1]}, may_fail: for_good}}"))
+    assert [*close(parse_net(HASTY), plant, Faults.FOR_GOOD).failed] == ["R", "M"]
+    assert faults_of(parse_net(HASTY), plant)["fault.safe"] is Status.VIOLATED, "M fails, and is given its command"
 
     before = parse_net(HASTY.replace("[idle]", "[idle, other]").replace("idle:\n", "idle:\n      other:\n"))
     before = replace(before, transitions=(*before.transitions, Transition("w", ("c.other",), ("c.moves",))))
