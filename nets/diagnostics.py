@@ -306,17 +306,20 @@ def _is_slip(name: str, meant: str) -> bool:
     )
 
 
-_DENIAL: Final = re.compile(r"(?:no?|non|not|un|in|dis|de)[_-]*|-")
+_DENIAL: Final = re.compile(r"(?:no?|non|not|un|in|dis|de)[._-]*|-")
+_DENIAL_BEHIND: Final = re.compile(r"[._-](?:n|not)")
 
 
 def _is_opposite(a: str, b: str) -> bool:
-    """Whether one word denies the other, as `nok`, `not_ok` and `unlocked` do: no slip leads from one to the other.
+    """Whether one word denies the other, as `nok`, `not_ok`, `ok_n` and `unlocked` do: that is no slip.
 
-    >>> _is_opposite("nok", "ok"), _is_opposite("part", "no_part"), _is_opposite("parts", "part")
+    >>> _is_opposite("nok", "ok"), _is_opposite("part", "part_n"), _is_opposite("parts", "part")
     (True, True, False)
     """
     short, long = sorted((a.lower(), b.lower()), key=len)
-    return long.endswith(short) and _DENIAL.fullmatch(long.removesuffix(short)) is not None
+    if long.endswith(short) and _DENIAL.fullmatch(long.removesuffix(short)):
+        return True
+    return long.startswith(short) and _DENIAL_BEHIND.fullmatch(long.removeprefix(short)) is not None
 
 
 def _edits(a: str, b: str) -> int:

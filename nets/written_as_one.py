@@ -23,11 +23,13 @@ _NAMES_MAX: Final = 12
 _WAYS_MAX: Final = 4
 """What is longer is told in general."""
 
-_AND: Final = re.compile(r"&+|(?<![^\s()])and(?![^\s()])", re.IGNORECASE)
-_OR: Final = re.compile(r"\|+|(?<![^\s()])or(?![^\s()])", re.IGNORECASE)
-_NOT: Final = re.compile(r"(?<![^\s(\[,;&|])(?:[!~/-]|not(?![^\s(]))", re.IGNORECASE)
+_AND: Final = re.compile(r"&+|∧|(?<![^\s()])and(?![^\s()])", re.IGNORECASE)
+_OR: Final = re.compile(r"\|+|∨|(?<![^\s()])or(?![^\s()])", re.IGNORECASE)
+_NOT: Final = re.compile(r"(?<![^\s(\[,;&|¬∧∨])(?:[!~¬/-]|not(?![^\s(]))", re.IGNORECASE)
 _MARKED: Final = re.compile(r"(?<![^\s(\[,;&|])[/-]")
 """A negation only before what is known: a name may begin so."""
+_DENYING: Final = frozenset("-/–—−")
+"""How a name begins that somebody may have meant to deny; a word processor makes the dashes."""
 _VALUE: Final = re.compile(
     r"(?P<name>[^\s()\[\],;&|!~=<>]+)\s*(?P<sign>==?|!=|<>|\bis\s+not\b|\bis\b)\s*"
     r"(?P<value>[01]|true|false|on|off|high|low)(?=$|[\s()\[\],;&|])",
@@ -54,12 +56,12 @@ def written_as_one(text: str, known: Collection[str], key: str) -> str:
 
 def is_one_name(text: str) -> bool:
     """Whether a text looks like one name."""
-    return not any(character.isspace() or character in "=!~&|,;()[]" for character in text)
+    return not any(character.isspace() or character in "=!~¬&∧|∨,;()[]:'’^\\" for character in text)
 
 
 def meant_by(text: str, known: Sequence[str]) -> str:
     """The start of a hint that names the closest known name, for a text that looks like one name, and denies none."""
-    return did_you_mean(text, known) if is_one_name(text) and text[:1] not in {"-", "/"} else ""
+    return did_you_mean(text, known) if is_one_name(text) and text[:1] not in _DENYING else ""
 
 
 def _list(text: str, known: Collection[str], key: str) -> str:

@@ -53,6 +53,9 @@ def test_the_cell_of_these_tests_is_well_formed_as_it_stands() -> None:
         ('if: "!a.s"', "unless: a.s"),
         ("if: ~a.s", "unless: a.s"),
         ("if: -a.s", "unless: a.s"),
+        ("if: ¬a.s", "unless: a.s"),
+        ("if: a.t ∧ ¬a.s", "if: a.t, unless: a.s"),
+        ("if: ¬(a.s ∨ a.t)", "unless: [a.s, a.t]"),
         ("if: /s", "unless: a.s"),
         ("if: [a.t, not a.s]", "unless: a.s"),
         ("if: a.s = 0", "unless: a.s"),
@@ -124,7 +127,24 @@ def test_an_arc_with_a_condition_is_sent_to_the_gates(source: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "gate", ["if: no a.s", "if: a.s xor", "if: /part/there", "if: -a.tt", "if: not_a.s", "if: a.not_s", "if: a.s=low?"]
+    "gate",
+    [
+        "if: no a.s",
+        "if: a.s xor",
+        "if: /part/there",
+        "if: -a.tt",
+        "if: –a.s",
+        "if: ^a.s",
+        "if: not_a.s",
+        "if: a.not_s",
+        "if: not.a.s",
+        "if: a.s_n",
+        "if: a.s_not",
+        "if: a.s.not",
+        "if: a.s'",
+        "if: a.s:0",
+        "if: a.s=low?",
+    ],
 )
 def test_what_is_not_understood_gets_no_name_that_may_be_its_opposite(gate: str) -> None:
     assert hints(gate=gate) == ["declare it first, or correct the name"]
@@ -139,6 +159,8 @@ def test_what_is_not_understood_gets_no_name_that_may_be_its_opposite(gate: str)
         ("cell.no_part_there", "cell.part_there"),
         ("not_cell.part_there", "cell.part_there"),
         ("unlocked", "cell.locked"),
+        ("cell.estop_n", "cell.estop"),
+        ("cell.estop", "cell.estop_n"),
     ],
 )
 def test_the_opposite_of_a_name_is_no_slip_of_it(name: str, known: str) -> None:
