@@ -44,12 +44,12 @@ class _ModbusOptions(Options):
 
     def point_problem(self, point: Point) -> str:
         """A number that may be the address, or that of a manual, where the binding does not say which is meant."""
-        found = address(point)
-        counted = counted_from_one(str(found.number))
-        if self.addresses is not None or counted.partition(" ")[0] != found.table:
+        table, _, number = point.partition(" ")
+        counted = counted_from_one(number)
+        if self.addresses is not None or counted.partition(" ")[0] != table:
             return ""
         return (
-            f"in a manual {found.number} is mostly `{counted}`, counted from 1, with its table before it: write that, "
+            f"in a manual {number} is mostly `{counted}`, counted from 1, with its table before it: write that, "
             "or `addresses: wire` at the device if its numbers are the addresses themselves"
         )
 

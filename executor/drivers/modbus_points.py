@@ -30,7 +30,7 @@ BIT_MAX: Final = 15
 REGISTER_MIN: Final = -(1 << 15)
 REGISTER_MAX: Final = (1 << 16) - 1
 _NUMBERED: Final = {"0": "coil", "1": "discrete", "3": "input", "4": "holding"}
-_OF_A_MANUAL: Final = re.compile(r"(?P<table>[0134])x?(?P<number>[0-9]{4,5})")
+_OF_A_MANUAL: Final = re.compile(r"(?![01].*\.)(?P<table>[0134])x?(?P<number>[0-9]{4,5})(?P<bit>\.[0-9]+)?")
 AT_ONCE_MAX: Final = {"coil": 1968, "discrete": 2000, "input": 125, "holding": 123}
 """How many a request may carry, by the standard."""
 
@@ -69,14 +69,16 @@ def address(point: Point) -> Address:
 
 
 def counted_from_one(number: str) -> Point:
-    """The point that a number of a manual is, such as 40012 or 4x0012; empty where it is none.
+    """The point that a number of a manual is, such as 40012, 4x0012 or, of a bit, 40012.3; empty where it is none.
 
-    >>> counted_from_one("40012"), counted_from_one("4x0012"), counted_from_one("300001"), counted_from_one("40000")
-    ('holding 11', 'holding 11', 'input 0', '')
+    >>> counted_from_one("40012"), counted_from_one("4x0012"), counted_from_one("300001.3"), counted_from_one("40000")
+    ('holding 11', 'holding 11', 'input 0.3', '')
     """
     found = _OF_A_MANUAL.fullmatch(number)
     at = int(found["number"]) - 1 if found is not None else -1
-    return f"{_NUMBERED[found['table']]} {at}" if found is not None and 0 <= at <= ADDRESS_MAX else ""
+    if found is None or not 0 <= at <= ADDRESS_MAX:
+        return ""
+    return f"{_NUMBERED[found['table']]} {at}{found['bit'] or ''}"
 
 
 def _number(text: str, most: int) -> int | None:

@@ -27,6 +27,7 @@ def why_not(point: str, *, wire: bool = False) -> str:
         ("4x0012", "holding 11"),
         ("400012", "holding 11"),
         ("holding 400012", "holding 11"),
+        ("40012.3", "holding 11.3"),
         ("30001", "input 0"),
         ("365536", "input 65535"),
         ("10001", "discrete 0"),
@@ -38,7 +39,9 @@ def test_a_number_of_a_manual_is_told_as_the_point_that_it_is(number: str, meant
     assert f"counted from 1, with its table before it, as manuals do, it is `{meant}`" in why_not(number)
 
 
-@pytest.mark.parametrize("number", ["holding 99999", "40000", "365537", "21", "4x12", "50001", "holding 0x0B"])
+@pytest.mark.parametrize(
+    "number", ["holding 99999", "40000", "365537", "21", "4x12", "50001", "10001.3", "holding 0x0B"]
+)
 def test_what_is_no_number_of_a_manual_gets_no_other_reading(number: str) -> None:
     assert "without a 0 before it" in why_not(number)
     assert "manuals" not in why_not(number)
@@ -48,7 +51,7 @@ def test_what_is_no_number_of_a_manual_gets_no_other_reading(number: str) -> Non
     ("point", "meant"),
     [
         ("holding 40012", "holding 11"),
-        ("holding 40012.3", "holding 11"),
+        ("holding 40012.3", "holding 11.3"),
         ("holding 49999", "holding 9998"),
         ("input 30011", "input 10"),
         ("discrete 10001", "discrete 0"),
