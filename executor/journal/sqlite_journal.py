@@ -223,7 +223,10 @@ class SqliteJournal:
 
     def _foreign(self, its_format: Any, its_digest: Any, machines: str, digest: str) -> NoReturn:
         path = printable(str(self.path))
+        hint = "name another journal, or run the bundle that the journal belongs to"
         if its_format != FORMAT:
+            hint = "end its run with the firable that has written it, with the machines at the initial marking, and "
+            hint += "name another journal then"
             message = f"{path}: the journal has format {its_format}, and this firable writes {FORMAT}"
         elif its_digest != digest:
             message = f"{path}: the journal is of the bundle {str(its_digest)[:12]}, and this one is {digest[:12]}"
@@ -232,7 +235,6 @@ class SqliteJournal:
             with suppress(ValueError, TypeError):
                 machines = all_called(map(str, json.loads(machines)))
             message = f"{path}: the journal is of {printable(machines)}, and not of {all_called(self.machines)}"
-        hint = "name another journal, or run the bundle that the journal belongs to"
         if its_format == FORMAT and its_digest != digest:
             hint += "; `firable takeover` lets a new bundle go on where that one has stopped"
         raise InputError([Diagnostic("F5031", message, hint)])

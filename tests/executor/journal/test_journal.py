@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from support.examples import examples
 
 from firable.executor.journal.journal import Journal, MemoryJournal, sync_now
-from firable.executor.journal.sqlite_journal import SqliteJournal, machines_of, mark_of, mark_text
+from firable.executor.journal.sqlite_journal import FORMAT, SqliteJournal, machines_of, mark_of, mark_text
 from firable.executor.protocol.messages import Firing, Keep, Stored
 from firable.nets.diagnostics import InputError
 
@@ -210,13 +210,17 @@ def test_journal_of_which_nothing_was_stored_yet_has_its_witness_or_is_refused(t
     assert message.endswith("cell.journal.generation beside it is missing or empty")
 
 
-def test_journal_of_a_later_format_is_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize("its_format", [FORMAT - 1, FORMAT + 1])
+def test_journal_of_another_format_is_ended_by_the_firable_that_wrote_it(tmp_path: Path, its_format: int) -> None:
     journal = filled(tmp_path)
-    journal.connection.execute("update header set format = 99")
+    journal.connection.execute("update header set format = ?", (its_format,))
     journal.close()
-    code, message = refused(lambda: sqlite(tmp_path))
-    assert code == "F5031"
-    assert "has format 99" in message
+    says = f"F5031.*has format {its_format}, and this firable writes {FORMAT}"
+    with pytest.raises(InputError, match=says) as refusal:
+        sqlite(tmp_path)
+    hint = refusal.value.diagnostics[0].hint
+    assert hint.startswith("end its run with the firable that has written it, with the machines at the initial marking")
+    assert "bundle" not in hint, "the right one would be refused as well"
 
 
 @pytest.mark.parametrize(
