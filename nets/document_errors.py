@@ -19,6 +19,7 @@ from pydantic import BaseModel, ValidationError
 from firable.nets import document as doc
 from firable.nets.diagnostics import Diagnostic, Subject, bounded, did_you_mean
 from firable.nets.source import Source, quoted
+from firable.nets.written_as_one import written_as_one
 from firable.nets.yaml_tree import Mapping as MappingNode
 from firable.nets.yaml_tree import Node, Path, Scalar, Sequence, as_written, node_span, nodes_along
 
@@ -205,8 +206,13 @@ def _problem(source: Source, tree: Node, shape: Shape, error: _Error, unknown: C
     key, node = found[-1]
     if kind == "extra_forbidden":
         unknown_key = f"unknown key {quoted(str(path[-1]))}{_inside(path[:-1])}"
-        if inner := _of_an_inner_mapping(shape, error.path, known, owner=found[-2][1] if len(found) > 1 else tree):
-            return Diagnostic("F1008", unknown_key, inner, span=node_span(source, key or node))
+        owner = found[-2][1] if len(found) > 1 else tree
+        of, names = _list_with(owner, str(path[-1]), known)
+        if names[2:] and path[-1] != names[1]:
+            return None  # what was said of the first says it
+        better = _of_an_inner_mapping(shape, error.path, known, owner) or written_as_one(", ".join(names), names, of)
+        if better:
+            return Diagnostic("F1008", unknown_key, better, span=node_span(source, key or node))
         hint = f"the keys here are {', '.join(known)}; check the indentation too"
         if isinstance(node, Scalar) and node.plain and not node.text and len(found) > 1:
             hint += ", and write a text with a comma in double quotes"
@@ -217,8 +223,8 @@ def _problem(source: Source, tree: Node, shape: Shape, error: _Error, unknown: C
             span=node_span(source, key or node),
         )
     if kind == "missing":
-        owner = found[len(path) - 1] if len(found) >= len(path) else found[-1]
-        written = _slip(owner[1], str(path[-1]), known)
+        own_key, mapping = found[len(path) - 1] if len(found) >= len(path) else found[-1]
+        written = _slip(mapping, str(path[-1]), known)
         if written is not None and (*error.path[:-1], written.text) in unknown:
             return None
         said = f": {quoted(written.text)} is not it" if written else ""
@@ -226,7 +232,7 @@ def _problem(source: Source, tree: Node, shape: Shape, error: _Error, unknown: C
             "F1009",
             f"the key '{path[-1]}' is missing{_inside(path[:-1])}{said}",
             f"write `{path[-1]}:`" if written else f"add `{path[-1]}:`",
-            span=node_span(source, written or owner[0] or owner[1]),
+            span=node_span(source, written or own_key or mapping),
         )
     if kind == "no_arcs" and _has_slipped(list(nodes_along(tree, path[:-1]))[-1][1], shape.keys_at(path)):
         return None  # its keys stand beside it, where that is said
@@ -242,6 +248,29 @@ def _problem(source: Source, tree: Node, shape: Shape, error: _Error, unknown: C
     return Diagnostic(
         "F1010", f"{_found(node)} stands{_where(path)}", _wanted(kind, context, node, path), span=node_span(source, at)
     )
+
+
+_OF_NAMES: Final = frozenset({"from", "to", "if", "unless", "start", "inputs", "among", "release"})
+"""Keys of lists of names; `from` and `to` are so where there are gates, too."""
+
+
+def _list_with(owner: Node, name: str, known: Collection[str]) -> tuple[str, list[str]]:
+    """The key and the names of a list without brackets in which a name stands, which is taken for a key; or none.
+
+    In braces `if: a, b` is the key `if` and a key `b`.
+    """
+    names, of = list[str](), ""
+    for key, (_, node) in owner.entries.items() if isinstance(owner, MappingNode) else ():
+        text = node.text if isinstance(node, Scalar) else None
+        if key in known:
+            if name in names:
+                break
+            names, of = [text] if text else [], key
+        else:
+            names = [*names, key] if names and text == "" else []
+    if name not in names or of not in _OF_NAMES or (of in {"from", "to"} and "if" not in known):
+        return "", []
+    return of, names
 
 
 _FORMS: Final = {
