@@ -17,12 +17,13 @@ if TYPE_CHECKING:
 
 _AGAIN: Final = "mend what it tells of, and give the same command again: with its --journal "
 AFTER_A_FAULT: Final = (
-    f"{_AGAIN}the run is taken up where it stood; without one bring the cell to its initial marking first"
+    f"{_AGAIN}the run is taken up where it stood; without one bring the cell to its initial marking first, and name "
+    "another --trace, if there was one"
 )
 """What to do after a run on machines that has ended by a fault."""
 AFTER_A_FAULT_OF_A_HOST: Final = (
     f"{_AGAIN}this host goes on where it stood; without one bring the cell to its initial marking, and start all hosts "
-    "anew, each with a new journal"
+    "anew, each with a new journal, and a new trace, if there was one"
 )
 """The same after that of one host among others, which know it by its journal."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 
@@ -76,3 +77,18 @@ def test_machines_do_not_go_on_where_a_simulation_has_stopped(
     assert main(["run", str(later), "--bind", str(binding), "--journal", taken, "--resume"]) == 2
     assert "F5031" in capsys.readouterr().err
     assert main(["run", str(later), *PLANT, "--journal", taken, "--resume"]) == 0
+
+
+def test_who_gives_the_same_command_again_without_a_journal_is_told_to_name_another_trace(
+    one_robot: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = catalogue_path("one_robot").with_name("one_robot.bind.yaml").read_text("utf-8")
+    binding, trace = tmp_path / "cell.bind.yaml", tmp_path / "cell.trace"
+    nowhere = text.replace("15020", "1").replace("14840", "1")
+    binding.write_text(re.sub(r"(?m)^    driver: .*$", r"\g<0>\n    start_s: 0.1", nowhere))
+    command = ["run", str(one_robot), "--bind", str(binding), "--trace", str(trace)]
+    assert main(command) == 1
+    assert "bring the cell to its initial marking first, and name another --trace" in capsys.readouterr().out
+    assert main(command) == 2
+    assert f"error[F1017]: {trace}: the trace of this run begins anew" in capsys.readouterr().err
+    assert main([*command[:-1], str(tmp_path / "another.trace")]) == 1
