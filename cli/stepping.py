@@ -32,6 +32,7 @@ from firable.executor.protocol.commands import SAID
 from firable.nets.source import one_line
 
 _PROMPT = "  [Enter] next, [r] run on, [e] stop at the end of the cycle, [s] stop now: "
+_THESE = "  [r] these are the machines of this journal, [s] stop now: "
 _TAKE_UP = "  [r] take the run up, [s] stop now: "
 _RESET = "  type reset when nobody is in the way any more, [s] end the run: "
 _SAY = "  what did the machine do? PLACE=done, =working or =not-received, [s] stop now: "
@@ -228,15 +229,19 @@ class _Person:
             if host.latch is not None:
                 was_stopped = True
                 await self._reset()
-            elif (found := host.taking_up) is None or not found.is_final:
+            elif (found := host.taking_up) is None or not (found.is_final or host.elsewhere is not None):
                 await asyncio.sleep(_POLL_SECONDS)
             else:
-                if was_stopped:  # nothing that was typed before this stands there takes the run up
+                # Nothing that was typed before this stands there takes the run up.
+                if was_stopped or host.elsewhere is not None:
                     self._forget()
                     was_stopped = False
                 for line in host.situation().message.split("; "):
                     self.say(f"  {line}")
-                await (self._said() if uncertain(host) else self._resumed())
+                if host.elsewhere is not None:
+                    await self._found_again()
+                else:
+                    await (self._said() if uncertain(host) else self._resumed())
             if host.is_to_end:
                 return False
         return True
@@ -256,6 +261,16 @@ class _Person:
             case "reset":
                 for why in host.reset():
                     self.say(f"  not reset: {why}")
+
+    async def _found_again(self) -> None:
+        """Say that machines that are elsewhere are those of the journal, or end the run."""
+        host = self.host
+        match await self._key(_THESE, {"r", "s"}, lambda: host.elsewhere is None or host.latch is not None):
+            case "s":
+                host.stop()
+            case "r":
+                host.resume()
+                host.pause()  # so that what they answer is seen before the run is taken up
 
     async def _resumed(self) -> None:
         """Take a run up that is held, or end it."""

@@ -69,7 +69,7 @@ def takeover(
     from firable.executor.operating.dispatch import TAKEN
     from firable.executor.operating.hosting import machines_of as hosted
     from firable.executor.operating.running import load
-    from firable.executor.operating.taken_up import MACHINES
+    from firable.executor.operating.whereabouts import MACHINES
     from firable.executor.protocol.deciders import TOP, coordinators
     from firable.nets.bundle import read_bundle
 

@@ -103,7 +103,10 @@ class Options(BaseModel):
         return False
 
     def far_end(self) -> object:
-        """What is equal of two devices that are one, however each is spoken with; by default all options."""
+        """What is equal of two devices that are one, however each is spoken with; by default all options.
+
+        A text of it is the same in each process, and holds no secret: journals keep it, and it is told (`whereabouts`).
+        """
         return self
 
     def point_problem(self, point: Point) -> str:

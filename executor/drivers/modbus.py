@@ -69,7 +69,7 @@ class TcpOptions(_ModbusOptions):
 
     def far_end(self) -> object:
         """A unit behind an address."""
-        return one_name(self.host), self.port, self.unit
+        return f"{one_name(self.host)}:{self.port} unit {self.unit}"
 
 
 class RtuOptions(_ModbusOptions):
@@ -84,7 +84,7 @@ class RtuOptions(_ModbusOptions):
 
     def far_end(self) -> object:
         """A unit on a line."""
-        return self.port, self.unit
+        return f"{self.port} unit {self.unit}"
 
 
 class _Modbus:

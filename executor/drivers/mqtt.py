@@ -87,7 +87,7 @@ class MqttOptions(Options):
 
     def far_end(self) -> object:
         """The broker, whoever asks it for what: topics are everybody's."""
-        return one_name(self.host), self.port
+        return f"{one_name(self.host)}:{self.port}"
 
 
 class Guarded:

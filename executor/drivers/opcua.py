@@ -149,7 +149,7 @@ class OpcUaOptions(Options):
     def far_end(self) -> object:
         """The server at an address; what stands behind that only chooses among the ways to speak with it."""
         parts = urlsplit(self.url)
-        return one_name(str(parts.hostname)), parts.port
+        return f"{one_name(str(parts.hostname))}:{parts.port}"
 
 
 class OpcUaConnection(Stepwise):

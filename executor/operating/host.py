@@ -50,6 +50,7 @@ from firable.executor.operating.single_step import step
 from firable.executor.operating.situation import Situation, State
 from firable.executor.operating.uncut import Patience
 from firable.executor.operating.watching import UNWATCHED, UNWATCHED_SENTENCE, Watching, otherwise
+from firable.executor.operating.whereabouts import Elsewhere
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import Keep, Message, Sending
@@ -84,6 +85,7 @@ class Host:
         figures: Metrics | None = None,
         patience: Patience | None = None,
         latched: Callable[[], Latched] | None = None,
+        elsewhere: Elsewhere | None = None,
     ) -> None:
         self.decomposition = decomposition
         self.net = decomposition.net
@@ -113,7 +115,9 @@ class Host:
         """Whether a run on this simulated cell goes round in a circle."""
         observers = (self.watching, figures, self.log, self.circling)
         recorder.observers += [one.seen for one in observers if one is not None]
-        self.said = conduct.said
+        self.elsewhere = elsewhere
+        """Machines that are not where the journal has them, until somebody has said that these are the machines."""
+        self.said = conduct.said if elsewhere is None else {}
         """What the operator has said beforehand of commands, by place."""
         self.patience = patience or Patience()
         self.latched = latched
@@ -244,9 +248,15 @@ class Host:
     def resume(self) -> bool:
         """Let transitions fire again after a pause, or after a restart once nothing about it is uncertain.
 
-        False where it is not, or the host is latched or stopping: what is owed would be commanded after the stop.
+        False where it is not, or the host is latched or stopping: what is owed would be commanded after the stop. Where
+        machines are elsewhere, it says that these are the machines; they are asked, and it goes on by itself then.
         """
-        if self.stopping or self.latch is not None or restart.uncertain(self):
+        if self.stopping or self.latch is not None:
+            return False
+        if self.taking_up is not None and self.elsewhere is not None:
+            restart.found_again(self, self.taking_up, self.elsewhere)
+            return True
+        if restart.uncertain(self):
             return False
         if self.taking_up is not None:
             if self.peers.is_unmet:

@@ -28,7 +28,8 @@ from firable.executor.operating.monitor import Divergence
 from firable.executor.operating.own_certificate import fault_of, fault_of_authority, remedy_of, unloaded
 from firable.executor.operating.service import demand_no_loop, figures_for, patience_with, run_to_the_end
 from firable.executor.operating.situation import Situation
-from firable.executor.operating.taken_up import On, opened
+from firable.executor.operating.taken_up import NOWHERE, On, opened
+from firable.executor.operating.whereabouts import machines_at
 from firable.executor.protocol.deciders import TOP, controller_of, coordinator_at, coordinators
 from firable.nets.bundle import Bundle
 from firable.nets.decomposition import Decomposition
@@ -231,15 +232,17 @@ def run_host(
     driver = drivers()
     if conduct.journal_path is not None:
         refuse_taken_over(conduct.journal_path)
+    at: Mapping[str, str] = NOWHERE
     if isinstance(driver, BoundDriver):
         listen_first(driver.binding)
+        at = machines_at(driver.binding, bundle.net)
     controllers = [subnet.name for subnet in bundle.decomposition.subnets if subnet.name in machines]
     monitor = None
     if plant is not None and conduct.watch is not Watch.IGNORE:
         monitor = LocalMonitor(bundle.decomposition, controllers, plant)
     on = On.NOTHING if isinstance(driver, DryRunDriver) else On.MACHINES
     decomposition, journal = bundle.decomposition, conduct.journal_path
-    with opened(decomposition, bundle.digest, journal, conduct.trace, machines=machines, on=on) as files:
+    with opened(decomposition, bundle.digest, journal, conduct.trace, machines=machines, on=on, at=at) as files:
         host = Host(
             decomposition,
             driver,
@@ -253,6 +256,7 @@ def run_host(
             figures=figures_for(bundle.net, conduct.service, machines),
             monitor=monitor,
             latched=partial(drivers, latched=True),
+            elsewhere=files.elsewhere,
         )
         if files.is_taken_up:
             host.unwatch()

@@ -6,11 +6,13 @@ is sent when the run is resumed, under the number it has; but where the machine 
 and that is *unknown*, too. *Unknown*: only a person who looks at the machine can tell, and until somebody has, the run
 cannot be resumed. A guess would be a command given twice, or never.
 
-What a person says counts only where the driver does not know: machines are believed before people.
+What a person says counts only where the driver does not know: machines are believed before people. But where a machine
+is not where the journal has it (`whereabouts.py`), it is asked nothing until a person has said that it is that one.
 """
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
@@ -21,6 +23,7 @@ from firable.executor.protocol.commands import Answer
 
 if TYPE_CHECKING:
     from firable.executor.operating.host import Host
+    from firable.executor.operating.whereabouts import Elsewhere
 
 UNASKED: Final = "unasked"
 """The kind of note of what was said of a command that nobody asked after."""
@@ -44,6 +47,8 @@ class TakingUp:
     """For each place whose command was asked after."""
     is_final: bool = False
     """Whether everything has been asked."""
+    are_these: asyncio.Event = field(default_factory=asyncio.Event)
+    """Set where machines are elsewhere, and somebody has said that these are the machines."""
 
 
 async def take_up(run: Host, found: TakingUp) -> None:
@@ -53,6 +58,12 @@ async def take_up(run: Host, found: TakingUp) -> None:
     an operator who resumes it before sees where it stands. A pause or a stop meanwhile takes back what was said
     beforehand: then only the operator's resume ends the hold.
     """
+    if run.elsewhere is not None:
+        run.told("held", _are_elsewhere(run, run.elsewhere))
+        if not (run.operated or run.served):
+            await _end_by_telling(run, found)
+            return
+        await found.are_these.wait()
     for name, controller in run.controllers.items():
         for place, entry in controller.commands.questions:
             answer = Answer((await run.driver.ask(run.net.place(place), entry)).value)
@@ -86,6 +97,34 @@ async def take_up(run: Host, found: TakingUp) -> None:
             if controller.held:
                 run.told("held", f"{called(name)} is held, until it is resumed")
     run.moved()
+
+
+async def _end_by_telling(run: Host, found: TakingUp) -> None:
+    """End a hold of which nobody here can say whether these are the machines, as a run of a whole cell does."""
+    await run.driver.met()
+    await run.quiet()
+    if not run.is_over:
+        found.is_final = True
+        run.moved()
+
+
+def found_again(run: Host, found: TakingUp, elsewhere: Elsewhere) -> None:
+    """Somebody has said that these are the machines: the journal has them here, and they are asked."""
+    elsewhere.keep(run.journal)
+    run.elsewhere = None
+    run.told("found again", "the operator has said that these are the machines: the journal has them here now")
+    found.resume = True
+    found.are_these.set()
+
+
+def _are_elsewhere(run: Host, elsewhere: Elsewhere) -> str:
+    """Which machines are elsewhere, and what there is to do."""
+    todo = "if they are the same machines, resume; if not, stop and name another journal"
+    if not (run.operated or run.served):
+        attended = "--serve or --step" if run.is_whole else "--serve"
+        todo = f"--resume does not count: if they are the same machines, start with {attended} and resume there"
+        todo += "; if not, name another journal"
+    return "; ".join((*elsewhere.sentences(), todo))
 
 
 def tell_unasked(run: Host, asked: Collection[str]) -> None:
@@ -134,6 +173,8 @@ def asked_of_the_operator(run: Host) -> list[str]:
 def told(run: Host, found: TakingUp) -> str:
     """The hold in words: each command that is not over, and what there is to do."""
     lines = ["the run was interrupted, and is taken up where it was; nothing moves until it is resumed"]
+    if run.elsewhere is not None:
+        return "; ".join((*lines, _are_elsewhere(run, run.elsewhere)))
     for place, answer in found.answers.items():
         tells = _VOID if answer is Answer.NOT_RECEIVED and _is_void(run, place) else _TELLS[answer]
         lines.append(f"'{run.net.place(place).command}' of '{place}' {tells}")

@@ -30,6 +30,7 @@ from firable.executor.operating.monitor import Divergence, Monitor
 from firable.executor.operating.service import demand_no_loop, figures_for, patience_with, run_to_the_end
 from firable.executor.operating.situation import Situation, State
 from firable.executor.operating.taken_up import Files, opened
+from firable.executor.operating.whereabouts import machines_at
 from firable.nets.bundle import Bundle, read_bundle
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError
@@ -199,7 +200,8 @@ def run_bound(
     if conduct.journal_path is not None:
         refuse_taken_over(conduct.journal_path)
     listen_first(driver.binding)
-    with opened(decomposition, bundle.digest, conduct.journal_path, conduct.trace) as files:
+    at = machines_at(driver.binding, net)
+    with opened(decomposition, bundle.digest, conduct.journal_path, conduct.trace, at=at) as files:
         host = Host(
             decomposition,
             driver,
@@ -211,6 +213,7 @@ def run_bound(
             monitor=None if plant is None or conduct.watch is Watch.IGNORE else Monitor(net, plant),
             figures=figures_for(net, conduct.service),
             latched=partial(bound_driver, binding, net, latched=True),
+            elsewhere=files.elsewhere,
         )
         return _run_whole(host, files)
 

@@ -5,23 +5,26 @@
     cell.journal.cell          what was done to the simulated cell: it outlives the process, as machines do
 
 Whatever cannot go on from where the last process was is refused, rather than begun anew beside machines that are
-somewhere else; and so is what would go on beside other machines than those of that process.
+somewhere else; and so is what would go on beside another kind of machines than those of that process. Whether they are
+where they were is for a person to say (`whereabouts.py`).
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
+from types import MappingProxyType
 from typing import Final
 
 from firable.executor.cell.cell_log import PUT_BACK, CellLog
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.journal.sqlite_journal import SqliteJournal
 from firable.executor.operating.recorder import CELL, KEY, TRACE, LineStream, Recorder, TraceFile, size_bytes_of
+from firable.executor.operating.whereabouts import AT, MACHINES, Elsewhere, elsewhere
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import Keep, Stored
@@ -33,10 +36,9 @@ from firable.nets.net import Net
 from firable.nets.source import printable
 from firable.semantics.trace import Start
 
-MACHINES: Final = "\nmachines"
-"""Whose row of the journal says on what the run commands: no machine of the protocol has a line feed in its name."""
-
 ON: Final = "on"
+
+NOWHERE: Final[Mapping[str, str]] = MappingProxyType({})
 
 
 class On(StrEnum):
@@ -57,6 +59,8 @@ class Files:
     begin_seconds: float
     is_taken_up: bool
     """Whether it goes on from where an earlier process, or bundle, was."""
+    elsewhere: Elsewhere | None = None
+    """Which machines are not where the journal has them."""
 
 
 @contextmanager
@@ -69,12 +73,13 @@ def opened(
     simulated: tuple[PlantModel, int, int] | None = None,
     machines: tuple[str, ...] = (),
     on: On = On.MACHINES,
+    at: Mapping[str, str] = NOWHERE,
 ) -> Iterator[Files]:
     """The files of a run, for as long as it lasts; without a journal nothing is taken up.
 
     `simulated` are plant, workpieces and seed of the simulated cell that would have to be where it was, if there is
     one; `machines` those of one host among others, whose clock goes on while it is down; `on` is what runs without a
-    simulated cell are on.
+    simulated cell are on, and `at` where each machine of a binding is.
 
     Raises `InputError` F5031-F5034 for a journal that cannot be gone on with, F5035 for a simulated cell of another
     run, F1017 for a trace that cannot be written or does not go on where it was.
@@ -90,6 +95,7 @@ def opened(
         kept = journal.kept(TRACE).get(KEY)
         begun = any(journal.kept(name) for name in names)
         is_taken_over = begun and kept is None
+        moved = _moved(decomposition, journal, at)
         if isinstance(trace, Path | str):
             if begun and not is_taken_over:
                 _demand_the_same(trace, kept)
@@ -105,7 +111,7 @@ def opened(
         start = start_of(decomposition, names, journal) if is_taken_over else None
         recorder = Recorder(net, net_digest(net), trace, kept, machines, now, start, cell)
         last = max(recorder.at_seconds, cell.end_seconds if cell is not None else 0.0, now - recorder.began)
-        yield Files(journal, recorder, cell, last, begun)
+        yield Files(journal, recorder, cell, last, begun, moved)
 
 
 def _demand_what_it_is_on(path: Path | str, journal: Journal, on: On, names: Collection[str]) -> None:
@@ -118,6 +124,16 @@ def _demand_what_it_is_on(path: Path | str, journal: Journal, on: On, names: Col
         )
         hint = "name another journal: the machines of this run are not where that one has left its own"
         raise InputError([Diagnostic("F5031", message, hint)])
+
+
+def _moved(decomposition: Decomposition, journal: Journal, at: Mapping[str, str]) -> Elsewhere | None:
+    """Which machines are not where the journal has them; where none is, it has them from now on where they are."""
+    has_tokens = any(journal.kept(subnet.name) for subnet in decomposition.subnets)
+    before = journal.kept(MACHINES).get(AT)
+    moved = elsewhere(before, at) if has_tokens else None
+    if moved is None and at and at != before:
+        journal.write(MACHINES, [Keep(AT, dict(at))])
+    return moved
 
 
 def _demand_the_same(path: Path | str, kept: Stored | None) -> None:

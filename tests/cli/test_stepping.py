@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import pytest
 from support.cells import decomposition_of
@@ -13,11 +13,13 @@ from firable.cli import stepping
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.driver import Answer, Latched
 from firable.executor.drivers.dry_run import DryRunDriver
+from firable.executor.journal.journal import MemoryJournal
 from firable.executor.operating.conduct import Conduct
 from firable.executor.operating.host import Host
-from firable.executor.operating.recorder import Recorder
+from firable.executor.operating.recorder import KEY, TRACE, Recorder
 from firable.executor.operating.restart import uncertain
 from firable.executor.operating.situation import Situation, State
+from firable.executor.operating.whereabouts import AT, MACHINES, Elsewhere
 from firable.nets.interchange import net_digest
 from firable.nets.net import Place
 from firable.semantics.replaying import replay
@@ -72,17 +74,36 @@ class Terminal:
 Act = str | Callable[[Terminal], object]
 
 
-def run(monkeypatch: pytest.MonkeyPatch, *acts: Act) -> tuple[Situation, list[tuple[str, int]]]:
+def run(
+    monkeypatch: pytest.MonkeyPatch,
+    *acts: Act,
+    journal: MemoryJournal | None = None,
+    stream: io.StringIO | None = None,
+    ahead: Sequence[str] = (),
+    elsewhere: Elsewhere | None = None,
+    kind: type[DryRunDriver] = Silent,
+) -> tuple[Situation, list[tuple[str, int]]]:
     """A run at whose terminal that is typed, and elsewhere done: how it ended, and what was asked."""
-    stream = io.StringIO()
+    journal, stream = journal or MemoryJournal(), stream or io.StringIO()
 
     def driver() -> Latched:
-        return Silent(DECOMPOSITION.subnets, 10.0)
+        return kind(DECOMPOSITION.subnets, 10.0)
 
-    recorder = Recorder(NET, net_digest(NET), stream)
+    recorder = Recorder(NET, net_digest(NET), stream, journal.kept(TRACE).get(KEY))
     with stepping.stepping(1.0, to_stderr=False) as operator:
-        host = Host(DECOMPOSITION, driver(), recorder, Conduct(operator=operator), latched=driver)
+        conduct = Conduct(operator=operator, resume=elsewhere is not None)
+        host = Host(
+            DECOMPOSITION,
+            driver(),
+            recorder,
+            conduct,
+            journal=journal,
+            begin_seconds=recorder.at_seconds,
+            latched=driver,
+            elsewhere=elsewhere,
+        )
         terminal = Terminal(host, acts)
+        terminal.ahead.extend(ahead)
         monkeypatch.setattr(stepping, "_TypedMeanwhile", lambda _: terminal)
         situation = run_in_virtual_time(host.main())
     assert replay(NET, parse_trace(stream.getvalue())).complete
@@ -186,3 +207,24 @@ def test_who_resets_nothing_ends_the_run_as_an_emergency_stop(
     assert asked == [("[Enter]", 1), ("type", 1)]
     assert (situation.state, situation.message) == (State.STOPPED, "emergency stop: a person")
     assert situation.is_emergency
+
+
+@pytest.mark.parametrize(("kind", "what"), [(Silent, ("robot.to_cv1=not-received",)), (DryRunDriver, ())])
+def test_machines_elsewhere_are_said_to_be_those_of_the_journal_before_they_are_asked(
+    kind: type[DryRunDriver], what: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    journal, before, stream = MemoryJournal(), io.StringIO(), io.StringIO()
+    run(monkeypatch, "", "s", journal=journal, stream=before)
+    stream.writelines(before.getvalue().splitlines(keepends=True)[:-1])  # the end is none any more
+    moved = Elsewhere({"CV1": ("serial there", "serial here")}, {"CV1": "serial here"})
+    words = ("", "r", *what, "r", "", "s")
+    situation, asked = run(
+        monkeypatch, *words, journal=journal, stream=stream, ahead=("r", "r"), elsewhere=moved, kind=kind
+    )
+    assert [question for question, _ in asked] == ["[r]", "[r]", *["what"] * len(what), "[r]", "[Enter]", "[Enter]"]
+    *before_it_is_taken_up, stepped, last = (fired for _, fired in asked)
+    assert set(before_it_is_taken_up) == {0}, "neither what is typed ahead nor Enter moves anything, nor the first r"
+    assert (stepped, last) == (1, 2)
+    assert not situation.is_held
+    assert journal.kept(MACHINES)[AT] == {"CV1": "serial here"}
+    assert stream.getvalue().index('"found again"') < stream.getvalue().index('"asked after"')

@@ -10,7 +10,8 @@ from firable.decompose.splitting.cut import split
 from firable.executor.journal.journal import sync_now
 from firable.executor.journal.sqlite_journal import SqliteJournal
 from firable.executor.links.link import COORDINATOR
-from firable.executor.operating.taken_up import MACHINES, ON, On
+from firable.executor.operating.taken_up import ON, On
+from firable.executor.operating.whereabouts import MACHINES
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.messages import Keep, Stored
 from firable.nets.bundle import read_bundle
