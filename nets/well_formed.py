@@ -40,6 +40,16 @@ def is_name(text: str) -> bool:
     return bool(text) and FORBIDDEN_IN_NAMES.isdisjoint(text) and text.isprintable()
 
 
+def as_name(text: str) -> str:
+    """A text of visible characters as a name, or a part of one: another for each text, and most are themselves.
+
+    >>> as_name("R1"), as_name("press 1"), as_name("press~201")
+    ('R1', 'press~201', 'press~7e201')
+    """
+    escaped = FORBIDDEN_IN_NAMES | {"~"}
+    return "".join(f"~{ord(one):02x}" if one in escaped else one for one in text)
+
+
 def problems(net: Net) -> Iterator[Diagnostic]:
     """Every rule of SEMANTICS, "The net", that the parts violate, found as it is asked for."""
     if not net.name.isprintable():

@@ -31,6 +31,7 @@ from firable.nets.machines.loop import ClosedLoop, Faults
 from firable.nets.machines.plant_file import PlantModel
 from firable.nets.net import Net, Property
 from firable.nets.verdict import Status, Verdict, Weight
+from firable.nets.well_formed import as_name
 
 _IN_DOUBT: Final = "it cannot fire again then, and is not known to be live without faults"
 
@@ -125,18 +126,20 @@ def _for_good(loop: ClosedLoop, live: tuple[str, ...]) -> Iterator[Family]:
         "what depends on a machine by its completion, not by a time",
     )
     for machine, failed in loop.failed.items() if live else ():
+        its = f"fault.{as_name(machine)}"
+        told = machine.replace("{", "{{").replace("}", "}}")  # braces of a note are what it is about
         yield Family(
-            f"fault.{machine}",
+            its,
             f"when {machine} has failed for good, all that is live without faults can still fire again",
-            {name: _goes_on(f"fault.{machine}.t{i}", failed, fires(loop, name)) for i, name in enumerate(live)},
+            {name: _goes_on(f"{its}.t{i}", failed, fires(loop, name)) for i, name in enumerate(live)},
             Weight.INFORMATION,
-            note=f"{machine} has failed, and {{}} can never fire again",
+            note=f"{told} has failed, and {{}} can never fire again",
         )
         places = [place.name for place in loop.cell.places]
         yield Family(
-            f"fault.{machine}.places",
+            f"{its}.places",
             f"when {machine} has failed for good, every place can still lose its token",
-            {name: _goes_on(f"fault.{machine}.p{i}", failed, Not(Holds(name))) for i, name in enumerate(places)},
+            {name: _goes_on(f"{its}.p{i}", failed, Not(Holds(name))) for i, name in enumerate(places)},
             Weight.INFORMATION,
         )
 
@@ -161,11 +164,11 @@ def _consequence(still: Verdict, hang: Verdict, found: Mapping[str, Verdict]) ->
 
 def _recovery(loop: ClosedLoop, machine: str, live: tuple[str, ...]) -> Family:
     failed = loop.failed[machine]
-    mended = {name: possible(f"repair.{machine}.{i}", fires(loop, name)) for i, name in enumerate(live)}
+    mended = {name: possible(f"repair.{as_name(machine)}.{i}", fires(loop, name)) for i, name in enumerate(live)}
     return Family(
-        f"fault.{machine}.repaired",
+        f"fault.{as_name(machine)}.repaired",
         f"after {machine} was repaired and goes on, all that is live without faults can fire again",
-        {**mended, "": possible(f"repair.{machine}", Not(Holds(failed)))},
+        {**mended, "": possible(f"repair.{as_name(machine)}", Not(Holds(failed)))},
         hint="something was lost while the machine stood still: see what the cell waits for at the end",
         note="from here {} can never fire again",
     )

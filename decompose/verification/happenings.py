@@ -50,6 +50,7 @@ from firable.decompose.verification.plant import (
 from firable.nets.machines.loop import Faults, Sending
 from firable.nets.machines.plant_file import Action, Carry, Clamp, Departure, Grasp, Move, Process, Put, Release, Stop
 from firable.nets.net import Place, Transition
+from firable.nets.well_formed import as_name
 
 Changes = dict[str, Value]
 Happens = Callable[[State], Iterator[Changes]]
@@ -83,7 +84,7 @@ class Plant(Things):
             yield f"sent/{place.name}", (partial(self.sent_late, place), [place])
         for place in self.commanding:
             if place.name not in self.stops:
-                yield f"{self.machine_of(place)}/done/{place.name}", (partial(self.done, place), [place])
+                yield f"{as_name(self.machine_of(place))}/done/{place.name}", (partial(self.done, place), [place])
 
     def _by_themselves(self) -> Iterator[tuple[str, Happens]]:
         for timer in self.timers:
@@ -91,7 +92,7 @@ class Plant(Things):
         for name in self.late:
             yield f"{name}/told", partial(self.told, name)
         for name in self.may_start:
-            yield f"{name}/started", partial(self.started, name)
+            yield f"{as_name(name)}/started", partial(self.started, name)
         for name, sensor in self.model.sensors.items():
             ways: dict[str, Happens] = {}
             if sensor.acknowledges is not None:
@@ -104,22 +105,22 @@ class Plant(Things):
             yield from ((f"{name}/{way}", partial(self.once_it_is_told, name, does)) for way, does in ways.items())
         for place in self.commanding:
             if place.name not in self.stops:
-                yield f"{self.machine_of(place)}/accident/{place.name}", partial(self.spoils, place)
+                yield f"{as_name(self.machine_of(place))}/accident/{place.name}", partial(self.spoils, place)
         for name in self.model.machines:
             for place in self.may_break_off(name):
-                yield f"{name}/still-done/{place.name}", partial(self.still_done, place)
-                yield f"{name}/still-accident/{place.name}", partial(self.still_spoils, place)
+                yield f"{as_name(name)}/still-done/{place.name}", partial(self.still_done, place)
+                yield f"{as_name(name)}/still-accident/{place.name}", partial(self.still_spoils, place)
         for place in self.failing:
-            yield f"{self.machine_of(place)}/fails/{place.name}", partial(self.fails, place)
+            yield f"{as_name(self.machine_of(place))}/fails/{place.name}", partial(self.fails, place)
         for name in self.may_fail if self.faults is Faults.REPAIRED else ():
-            yield f"{name}/repaired", partial(self.repaired, name)
+            yield f"{as_name(name)}/repaired", partial(self.repaired, name)
         for name in self.sensed:
             yield f"{name}/shown", partial(self.comes_to_be_shown, name)
-        yield f"arrives/{self.model.arrivals.station}", self.arrives
+        yield f"arrives/{as_name(self.model.arrivals.station)}", self.arrives
         for out in self.model.departures:
-            yield f"leaves/{out.station}", partial(self.leaves, out)
+            yield f"leaves/{as_name(out.station)}", partial(self.leaves, out)
         for station in sorted(self.judged):
-            yield f"{station}/judged", partial(self.judges, station)
+            yield f"{as_name(station)}/judged", partial(self.judges, station)
 
     def once_it_is_told(self, name: str, happens: Happens, state: State) -> Iterator[Changes]:
         """Nobody outside, and no sensor by itself, waits until a controller is told of anything but this very signal.

@@ -21,6 +21,7 @@ from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Hold
 from firable.nets.net import Net, Property, PropertyKind, TemporalProperty, Transition
 from firable.nets.temporal import Fires, TemporalOr
 from firable.nets.verdict import Weight
+from firable.nets.well_formed import as_name
 
 
 @dataclass(frozen=True)
@@ -101,19 +102,20 @@ class Asked:
         )
         live = tuple(live)
         for machine in self.plant.may_fail if live else ():
+            its = f"fault.{as_name(machine)}"
             well = Not(Holds(self.of(f"failed {machine}")))
             fires = [Or((well, self.fires(name))) for name in live]
             leaves = [Or((well, Not(Holds(place.name)))) for place in self.cell.places]
             yield Question(
-                f"fault.{machine}",
+                its,
                 f"when {machine} has failed for good, all that is live without faults can still fire again",
-                {name: self.possible(f"fault.{machine}.t{i}", fires[i]) for i, name in enumerate(live)},
+                {name: self.possible(f"{its}.t{i}", fires[i]) for i, name in enumerate(live)},
                 Weight.INFORMATION,
             )
             yield Question(
-                f"fault.{machine}.places",
+                f"{its}.places",
                 f"when {machine} has failed for good, every place can still lose its token",
-                {p.name: self.possible(f"fault.{machine}.p{i}", leaves[i]) for i, p in enumerate(self.cell.places)},
+                {p.name: self.possible(f"{its}.p{i}", leaves[i]) for i, p in enumerate(self.cell.places)},
                 Weight.INFORMATION,
             )
 
@@ -121,12 +123,12 @@ class Asked:
         """What is asked of the cell of which one machine may fail, and is repaired."""
         live = tuple(live)
         for machine in self.plant.may_fail if live else ():
-            asked = {n: self.possible(f"repair.{machine}.{i}", self.fires(n)) for i, n in enumerate(live)}
+            asked = {n: self.possible(f"repair.{as_name(machine)}.{i}", self.fires(n)) for i, n in enumerate(live)}
             well = Not(Holds(self.of(f"failed {machine}")))
             yield Question(
-                f"fault.{machine}.repaired",
+                f"fault.{as_name(machine)}.repaired",
                 f"after {machine} was repaired and goes on, all that is live without faults can fire again",
-                {**asked, "": self.possible(f"repair.{machine}", well)},
+                {**asked, "": self.possible(f"repair.{as_name(machine)}", well)},
             )
 
     # --- What they are made of

@@ -30,6 +30,7 @@ from firable.nets.machines.plant_file import (
     Work,
 )
 from firable.nets.net import Net, Place, SignalKind, Transition
+from firable.nets.well_formed import as_name
 
 ACCIDENT: Final = "accident"
 OVERRUN: Final = "overrun"
@@ -82,33 +83,35 @@ class Things:
                 found[f"bit {name}"] = {True: f"plant.{name}.sensor" if name in self.completions else name}
         found |= {f"told {name}": {True: f"plant.{name}.told_1", False: f"plant.{name}.told_0"} for name in self.late}
         found |= {f"news of {name}": {True: f"plant.{name}.news"} for name in self.late}
-        found |= {f"starting {name}": {True: f"plant.{name}.starting"} for name in self.may_start}
+        found |= {f"starting {name}": {True: f"plant.{as_name(name)}.starting"} for name in self.may_start}
         found |= {UNTOLD: {True: "plant.untold"}} if self.may_start else {}
         found |= {f"acknowledged {name}": {True: f"plant.{name}.acknowledged"} for name in self.sensed}
         if self.sending is Sending.LATE:
             found |= {f"unsent {p.name}": {True: f"plant.unsent.{p.name}"} for p in self.commanding}
-        found |= {f"failed {name}": {True: f"plant.{name}.failed"} for name in self.may_fail}
+        found |= {f"failed {name}": {True: f"plant.{as_name(name)}.failed"} for name in self.may_fail}
         for name, machine in self.model.machines.items():
-            at: dict[Value, str] = {None: f"plant.{name}.idle"}
-            at |= {p.name: f"plant.{name}.at.{p.name}" for p in self.commanding if self.machine_of(p) == name}
+            its = f"plant.{as_name(name)}"
+            at: dict[Value, str] = {None: f"{its}.idle"}
+            at |= {p.name: f"{its}.at.{p.name}" for p in self.commanding if self.machine_of(p) == name}
             found[f"at {name}"] = at
             if self.may_break_off(name):
-                breaks: dict[Value, str] = {None: f"plant.{name}.breaks_off_nothing"}
-                breaks |= {p.name: f"plant.{name}.breaks_off.{p.name}" for p in self.may_break_off(name)}
+                breaks: dict[Value, str] = {None: f"{its}.breaks_off_nothing"}
+                breaks |= {p.name: f"{its}.breaks_off.{p.name}" for p in self.may_break_off(name)}
                 found[f"breaks off {name}"] = breaks
             if machine.hand is not None:
-                hands: dict[Value, str] = {where: f"plant.{name}.hand_at.{where}" for where in machine.positions}
+                hands: dict[Value, str] = {where: f"{its}.hand_at.{as_name(where)}" for where in machine.positions}
                 found[f"hand {name}"] = hands
             if machine.hand is not None or any(isinstance(one, Carry) for one in machine.commands.values()):
-                kinds: dict[Value, str] = {kind: f"plant.{name}.holds_{kind}" for kind in self.kinds}
-                found[f"has {name}"] = {None: f"plant.{name}.holds_nothing"} | kinds
+                kinds: dict[Value, str] = {kind: f"{its}.holds_{kind}" for kind in self.kinds}
+                found[f"has {name}"] = {None: f"{its}.holds_nothing"} | kinds
         for name in self.model.stations:
-            lies: dict[Value, str] = {kind: f"plant.{name}.{kind}" for kind in self.kinds}
-            found[f"has {name}"] = {None: f"plant.{name}.empty"} | lies
+            its = f"plant.{as_name(name)}"
+            lies: dict[Value, str] = {kind: f"{its}.{kind}" for kind in self.kinds}
+            found[f"has {name}"] = {None: f"{its}.empty"} | lies
             if name in self.clamps:
-                found[f"clamped {name}"] = {True: f"plant.{name}.clamped"}
+                found[f"clamped {name}"] = {True: f"{its}.clamped"}
             if name in self.judged:
-                found[f"judged {name}"] = {GOOD: f"plant.{name}.passes", BAD: f"plant.{name}.fails"}
+                found[f"judged {name}"] = {GOOD: f"{its}.passes", BAD: f"{its}.fails"}
         return found | {ACCIDENT: {True: "plant.accident"}, OVERRUN: {True: "plant.overrun"}}
 
     @cached_property
@@ -147,7 +150,8 @@ class Things:
             return [way for way in ways if self.may_be_untold({**state, **way})]
         if not thing.startswith(("breaks off ", "starting ")):
             return [{thing: value} for value in self.values(thing)]
-        kind, _, machine = thing.rpartition(" ")
+        kind = "starting" if thing.startswith("starting ") else "breaks off"
+        machine = thing.removeprefix(f"{kind} ")
         at = f"at {machine}"
         at_rest = [False] if kind == "starting" else [None]
         return [

@@ -44,6 +44,7 @@ from firable.nets.machines.moment import NOTHING, Case, Literal, Moment, each
 from firable.nets.machines.plant_file import Failure, PlantModel, Stop, misfits
 from firable.nets.machines.telling import Telling
 from firable.nets.net import Controller, Net, Place, SignalKind, Transition
+from firable.nets.well_formed import as_name
 from firable.nets.yaml_tree import Path
 
 VARIANTS_MAX: Final = 4096
@@ -95,7 +96,8 @@ class _Closing:
         }
         self.failing = self.may_fail(faults)
         self.repaired = faults is Faults.REPAIRED
-        self.failed = {name: f"{PLANT}.{name}.failed" for name in model.machines if name in self.failing.values()}
+        may_fail = [name for name in model.machines if name in self.failing.values()]
+        self.failed = {name: f"{PLANT}.{as_name(name)}.failed" for name in may_fail}
 
     def alike(
         self, places: Iterable[Place], variants: Mapping[str, Iterable[Transition]], moves: Iterable[Transition]
@@ -129,7 +131,7 @@ class _Closing:
             if name not in first:
                 first[name] = told
                 continue
-            cause = max((one for one in written if one in name), key=len, default="")
+            cause = max((one for one in written if one in name or as_name(one) in name), key=len, default="")
             path = written.get(cause, ())
             renamed = f"'{cause}'" if cause else "one of them"
             span = None if path[:1] in {("places",), ("transitions",)} else self.model.span(path)
@@ -277,9 +279,9 @@ class _Closing:
         if len(told) + len(ended) > TOLD_MAX:
             raise _too_many(transition, TOLD_MAX)
         for moment in told:
-            yield moment.transition("/".join((transition.name, *moment.tags)), _told(transition, moment))
+            yield moment.transition(moment.name(transition.name), _told(transition, moment))
         for moment in ended:
-            yield self.accident("/".join((transition.name, *moment.tags)), _told(transition, moment), moment)
+            yield self.accident(moment.name(transition.name), _told(transition, moment), moment)
 
     def applied(self, transition: Transition) -> Case:
         """With commands that are sent late, what is taken or read was applied before, and what is put will be."""
@@ -335,19 +337,19 @@ class _Closing:
             done = [
                 one for moment in done for seen in self.seen(moment) for one in each([seen], self.formed(place, seen))
             ]
-            yield from self.named(f"{name}/done/{place.name}", f"{words} is done", done, [place])
-            yield from self.ended(f"{name}/accident/{place.name}", each(at_work, self.laws.spoiled(place)))
+            yield from self.named(f"{as_name(name)}/done/{place.name}", f"{words} is done", done, [place])
+            yield from self.ended(f"{as_name(name)}/accident/{place.name}", each(at_work, self.laws.spoiled(place)))
             if place.name in self.failing:
                 others = tuple((failed, False) for other, failed in self.failed.items() if other != name)
                 failed = self.failed[name]
                 fails = Case((*working, *others), ((failed, True),))
-                yield from self.named(f"{name}/fails/{place.name}", f"{words} fails", each(calm, [fails]))
+                yield from self.named(f"{as_name(name)}/fails/{place.name}", f"{words} fails", each(calm, [fails]))
         for name, places in self.laws.may_break_off.items():
             for place in places:
                 yield from self.still_moves(name, place, calm)
         for name, failed in self.failed.items() if self.repaired else ():
             repair = Case(((failed, True),), ((failed, False),))
-            yield from self.named(f"{name}/repaired", f"{name} is repaired and goes on", each(calm, [repair]))
+            yield from self.named(f"{as_name(name)}/repaired", f"{name} is repaired and goes on", each(calm, [repair]))
         for signal, waiting in self.acknowledged.items():
             shows = Case(((waiting, True), (signal, False), self.sensor(signal)), ((waiting, False), (signal, True)))
             yield from self.named(f"{signal}/shown", f"the sensor of {signal} shows it", each(calm, [shows]))
@@ -363,8 +365,8 @@ class _Closing:
         still = each(each(calm, [works]), [self.laws.no_longer_broken_off(place)])
         done = chain.from_iterable(map(self.seen, each(still, self.laws.done(place))))
         words = f"{self.words(place)} is still done, before {name} has come to rest"
-        yield from self.named(f"{name}/still-done/{place.name}", words, done)
-        yield from self.ended(f"{name}/still-accident/{place.name}", each(still, self.laws.spoiled(place)))
+        yield from self.named(f"{as_name(name)}/still-done/{place.name}", words, done)
+        yield from self.ended(f"{as_name(name)}/still-accident/{place.name}", each(still, self.laws.spoiled(place)))
 
     def sent_late(self, calm: list[Moment]) -> Iterator[Transition]:
         for name, unsent in self.unsent.items():
@@ -378,16 +380,16 @@ class _Closing:
     def workpieces(self, calm: list[Moment]) -> Iterator[Transition]:
         entry = self.model.arrivals.station
         arrived = chain.from_iterable(map(self.seen, each(calm, [self.laws.arrives()])))
-        yield from self.named(f"arrives/{entry}", f"a workpiece comes to {entry}", arrived)
+        yield from self.named(f"arrives/{as_name(entry)}", f"a workpiece comes to {entry}", arrived)
         for departure in self.model.departures:
             exit_ = departure.station
             gone = chain.from_iterable(map(self.seen, each(calm, self.laws.departs(departure))))
-            yield from self.named(f"leaves/{exit_}", f"the workpiece on {exit_} is taken away", gone)
-            yield from self.ended(f"leaves/{exit_}", each(calm, self.laws.departs_raw(departure)))
+            yield from self.named(f"leaves/{as_name(exit_)}", f"the workpiece on {exit_} is taken away", gone)
+            yield from self.ended(f"leaves/{as_name(exit_)}", each(calm, self.laws.departs_raw(departure)))
         for station in self.model.stations:
             there = each(calm, [self.telling.is_seen(station)]) if station in self.laws.judged else []
             judged = each(there, self.laws.judges(station))
-            yield from self.named(f"{station}/judged", f"the workpiece on {station} is judged", judged)
+            yield from self.named(f"{as_name(station)}/judged", f"the workpiece on {station} is judged", judged)
 
     def unsteady(self, calm: list[Moment]) -> Iterator[Transition]:
         """What a sensor that is not exact does by itself, a key, and what is set from outside.
@@ -447,7 +449,7 @@ class _Closing:
 
     def ended(self, name: str, moments: Iterable[Moment]) -> Iterator[Transition]:
         for moment in moments:
-            yield self.accident("/".join((name, *moment.tags)), moment.says[-1], moment)
+            yield self.accident(moment.name(name), moment.says[-1], moment)
 
     def words(self, place: Place) -> str:
         return str(place.command)
@@ -496,7 +498,7 @@ class _Closing:
 
 def _named(name: str, description: str, moments: Iterable[Moment]) -> Iterator[Transition]:
     for moment in moments:
-        yield moment.transition("/".join((name, *moment.tags)), ", ".join((description, *moment.says)))
+        yield moment.transition(moment.name(name), ", ".join((description, *moment.says)))
 
 
 def _told(transition: Transition, moment: Moment) -> str:

@@ -41,6 +41,7 @@ from firable.nets.machines.plant_file import (
     Work,
 )
 from firable.nets.net import Command, Net, Place
+from firable.nets.well_formed import as_name
 
 _RAW, _MACHINED = "raw", "machined"
 
@@ -97,11 +98,11 @@ class Laws:
 
     def busy(self, place: Place) -> str:
         """The place that says that the machine is at the command of a place of the cell."""
-        return f"{PLANT}.{_command(place).machine}.at.{place.name}"
+        return f"{PLANT}.{as_name(_command(place).machine)}.at.{place.name}"
 
     def idle(self, machine: str) -> str:
         """The place that says that a machine is at no command."""
-        return f"{PLANT}.{machine}.idle"
+        return f"{PLANT}.{as_name(machine)}.idle"
 
     @cached_property
     def may_break_off(self) -> dict[str, tuple[Place, ...]]:
@@ -116,31 +117,31 @@ class Laws:
 
     def breaks_off(self, place: Place) -> str:
         """The place that says that the command of a place was broken off by a stop, and may still be done."""
-        return f"{PLANT}.{_command(place).machine}.breaks_off.{place.name}"
+        return f"{PLANT}.{as_name(_command(place).machine)}.breaks_off.{place.name}"
 
     def breaks_off_nothing(self, machine: str) -> str:
         """The place that says that nothing that was broken off at a machine may still be done."""
-        return f"{PLANT}.{machine}.breaks_off_nothing"
+        return f"{PLANT}.{as_name(machine)}.breaks_off_nothing"
 
     def hand_at(self, machine: str, position: str) -> str:
         """The place that says where a hand is."""
-        return f"{PLANT}.{machine}.hand_at.{position}"
+        return f"{PLANT}.{as_name(machine)}.hand_at.{as_name(position)}"
 
     def empty(self, holder: str) -> str:
         """The place that says that a station is empty, or that a machine holds nothing."""
-        return f"{PLANT}.{holder}.{'holds_nothing' if holder in self.model.machines else 'empty'}"
+        return f"{PLANT}.{as_name(holder)}.{'holds_nothing' if holder in self.model.machines else 'empty'}"
 
     def has(self, holder: str, kind: str) -> str:
         """The place that says that a station or a machine has a workpiece of a kind."""
-        return f"{PLANT}.{holder}.{'holds_' if holder in self.model.machines else ''}{kind}"
+        return f"{PLANT}.{as_name(holder)}.{'holds_' if holder in self.model.machines else ''}{kind}"
 
     def clamped(self, station: str) -> str:
         """The place that says that the workpiece on a station is clamped."""
-        return f"{PLANT}.{station}.clamped"
+        return f"{PLANT}.{as_name(station)}.clamped"
 
     def verdict(self, station: str, *, good: bool) -> str:
         """The place that says that the workpiece on a station was found good, or that it was not."""
-        return f"{PLANT}.{station}.{'passes' if good else 'fails'}"
+        return f"{PLANT}.{as_name(station)}.{'passes' if good else 'fails'}"
 
     def places(self) -> Iterator[Place]:
         """The places of machines and stations, as they are when all is at rest and no workpiece has come."""

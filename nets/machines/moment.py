@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from firable.nets.net import Transition
+from firable.nets.well_formed import as_name
 
 Literal = tuple[str, bool]
 """A place, and whether it holds a token."""
@@ -68,6 +69,10 @@ class Moment:
             after[place] = value
         tags = (*self.tags, case.tag) if case.tag else self.tags
         return Moment(before, after, tags, (*self.says, case.says) if case.says else self.says)
+
+    def name(self, begins: str) -> str:
+        """A name that begins so, and ends with the words that tell this firing from the others."""
+        return "/".join((begins, *map(as_name, self.tags)))
 
     def transition(self, name: str, description: str) -> Transition:
         """The transition that this firing is."""

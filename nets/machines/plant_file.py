@@ -31,8 +31,8 @@ from firable.nets.document import Name, OptionalName, given
 from firable.nets.document_errors import Shape, document_problems, keys_of, version_problem
 from firable.nets.net import Net, SignalKind
 from firable.nets.source import Source, quoted, read_source
-from firable.nets.well_formed import is_name
 from firable.nets.yaml_tree import Node, Path, Scalar, as_written, data, node_span, nodes_along, parse_tree
+from firable.nets.yaml_writing import scalar
 
 SIZE_BYTES_MAX: Final = 1024 * 1024
 
@@ -415,8 +415,9 @@ def _no_names(model: PlantModel) -> Iterator[tuple[Path, str, str]]:
         named.append((path, name, "machine"))
         named += [((*path, "positions", position), position, "position") for position in machine.positions]
     for where, name, what in named:
-        if not is_name(name):
-            yield where, f"{quoted(name)} is not a name for a {what}", "use letters, digits, '_', '-' and '.'"
+        if not name.isprintable():
+            message = f"{quoted(name)} is not a name for a {what}: it has a character that cannot be seen"
+            yield where, message, "write it in visible characters, here and in the net"
 
 
 def _disagreements(model: PlantModel) -> Iterator[tuple[Path, str, str]]:
@@ -530,14 +531,14 @@ def _misfits_of_places(model: PlantModel, net: Net) -> Iterator[Diagnostic]:
         sent = f"'{place.name}' sends '{command}'"
         known = model.machines.get(command.machine)
         if known is None:
-            written = f"{command.machine}: {{commands: {{{command.command}: {_WORK}}}}}"
+            written = f"{scalar(command.machine)}: {{commands: {{{scalar(command.command)}: {_WORK}}}}}"
             hint = did_you_mean(command.machine, list(model.machines)) + _add(written)
             message = f"{sent}, and the plant has no such machine '{command.machine}'"
             yield model.misfit(("machines",), subject, message, hint)
             continue
         inner = ("machines", command.machine, "commands", command.command)
         if command.command not in known.commands:
-            hint = did_you_mean(command.command, list(known.commands)) + _add(f"{command.command}: {_WORK}")
+            hint = did_you_mean(command.command, list(known.commands)) + _add(f"{scalar(command.command)}: {_WORK}")
             yield model.misfit(inner, subject, f"{sent}, and the plant has no such command '{command.command}'", hint)
             continue
         action, parameters = known.commands[command.command], dict(command.parameters)

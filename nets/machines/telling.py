@@ -43,6 +43,7 @@ from firable.nets.machines.loop import PLANT
 from firable.nets.machines.moment import Case, Literal, Moment, each
 from firable.nets.machines.plant_file import Carry, Grasp, Process, Put, Stop
 from firable.nets.net import Place, SignalKind
+from firable.nets.well_formed import as_name
 
 Change = tuple[str, bool]
 """A signal, and the value that it changes to."""
@@ -193,7 +194,8 @@ class Telling:
         """For each machine the place that says that it is starting: that there was news when it was given the command
         that it is at, and has been ever since. None where nothing is told late, or where it is only stopped at once."""
         some = {self.laws.machine(place)[0] for place in self.laws.commanding if self.laws.lasts(place)}
-        return {name: f"{PLANT}.{name}.starting" for name in self.laws.model.machines if self.late and name in some}
+        those = [name for name in self.laws.model.machines if self.late and name in some]
+        return {name: f"{PLANT}.{as_name(name)}.starting" for name in those}
 
     # --- Its places and firings
 
@@ -256,7 +258,7 @@ class Telling:
             yield f"{signal}/told", f"the controller is told of {signal}", tuple(ways)
         for name, starting in self.starting.items():
             started = Case(((_UNTOLD, False), (starting, True)), ((starting, False),))
-            yield f"{name}/started", f"{name} is at its command, and all is told", (started,)
+            yield f"{as_name(name)}/started", f"{name} is at its command, and all is told", (started,)
 
     def of(self, moment: Moment, places: Collection[Place] = ()) -> list[Moment]:
         """A firing with what controllers are told of it in the firing itself; what is told late is news.

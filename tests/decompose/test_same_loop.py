@@ -27,6 +27,7 @@ from firable.nets.machines.plant_file import PlantModel, parse_plant
 from firable.nets.machines.telling import Telling
 from firable.nets.net import Net, Place, Transition
 from firable.nets.text import parse_net
+from firable.nets.well_formed import is_name
 
 CELLS = (
     *("one_robot", "one_robot_mc_late", "one_robot_mc_late_capacity", "one_robot_timed"),
@@ -46,6 +47,43 @@ def test_the_loop_of_every_cell_of_the_catalogue_is_what_its_plant_file_says(
 ) -> None:
     net, model, loop = closed(name, sending, faults)
     assert compare(Plant(net, model, sending, faults), loop) > 2 * len(loop.net.transitions)
+
+
+ODD = ("R 1", "R~201", "Presse A/1 #ü", "{} 'at' | \\ \"[1]\" (a), %s")
+"""Names of machines that a net accepts; the first two are alike where a blank is written as `~20` and nothing else."""
+
+
+@pytest.mark.parametrize(("sending", "faults"), KINDS)
+def test_machines_stations_and_positions_may_have_any_name_that_can_be_seen(sending: Sending, faults: Faults) -> None:
+    net, model, plain = closed("one_robot_timed", sending, faults)
+    machines = dict(zip(model.machines, ODD, strict=True))
+    stations = {name: f"{name} at {it}" for name, it in zip(model.stations, (*ODD, "x y"), strict=True)}
+    positions = {name: f"in front of #{name}" for name in model.machines["R"].positions}
+    odd = Plant(*renamed(net, model, stations | positions | machines), sending, faults)
+    loop = close(odd.net, odd.model, faults, sending)
+    assert list(odd.model.machines) == list(ODD)
+    assert compare(odd, loop) == compare(Plant(net, model, sending, faults), plain)
+    assert all(map(is_name, (*loop.net.place_index, *loop.net.transition_index)))
+    assert len(loop.net.places) == len(plain.net.places)
+    assert len(loop.net.transitions) == len(plain.net.transitions)
+
+
+def renamed(net: Net, model: PlantModel, names: dict[str, str]) -> tuple[Net, PlantModel]:
+    """A cell whose machines, stations and positions have other names."""
+
+    def written(part: Any) -> Any:
+        if isinstance(part, dict):
+            return {names.get(key, key): written(one) for key, one in part.items()}
+        return [written(one) for one in part] if isinstance(part, list) else names.get(part, part)
+
+    def of_place(place: Place) -> Place:
+        if (sent := place.command) is None:
+            return place
+        parameters = tuple((key, names.get(value, value)) for key, value in sent.parameters)
+        return replace(place, command=replace(sent, machine=names[sent.machine], parameters=parameters))
+
+    data = written(model.model_dump(by_alias=True, exclude_defaults=True))
+    return replace(net, places=tuple(map(of_place, net.places))), PlantModel.model_validate(data)
 
 
 def test_both_readings_agree_on_plants_of_every_kind() -> None:

@@ -440,9 +440,9 @@ def test_hint_at_a_sensor_that_the_plant_lacks_names_all_that_one_can_see() -> N
         ("{holding: R}", "{}", 26, "a sensor sees one thing"),
         ("{holding: R}", "{holding: M}", 26, "'M' never holds anything"),
         ("[entry, table, exit]", "[entry, table, exit, table]", 3, "'table' stands here a second time"),
-        ("[entry, table, exit]", "[entry, table, exit, left bin]", 3, "'left bin' is not a name for a station"),
-        ("{HOME: ,", "{HOME: , at rest: ,", 9, "'at rest' is not a name for a position"),
-        ("  R:\n", "  R 1:\n", 7, "'R 1' is not a name for a machine"),
+        ("[entry, table, exit]", '[entry, table, exit, "a\\u200bb"]', 3, "is not a name for a station: it has a char"),
+        ("{HOME: ,", '{HOME: , "a\\tb": ,', 9, "is not a name for a position: it has a character that cannot"),
+        ("  R:\n", '  "R\\e[2J":\n', 7, "is not a name for a machine: it has a character that cannot be seen"),
     ],
 )
 def test_plant_file_that_contradicts_itself_is_refused_with_its_line(
