@@ -31,6 +31,7 @@ from firable.cli.options import (
 )
 from firable.cli.report import Report
 from firable.cli.structure import structure_json, structure_lines
+from firable.cli.terminated import terminated_as_by_ctrl_c
 
 if TYPE_CHECKING:
     from firable.analysis.report import CheckReport
@@ -139,6 +140,7 @@ class _Asked:
 )
 @click.option("-v", "--verbose", is_flag=True, help="Tell methods, costs and the sequences of warnings too.")
 @formats_option
+@terminated_as_by_ctrl_c()
 def check(
     nets: tuple[str, ...],
     discipline: str,
@@ -162,9 +164,9 @@ def check(
 
     Deadlock, contact, dead and live transitions, conflicts, gate races, commands, the properties that the file itself
     states, and queries in CTL, LTL and more (docs/queries.md). Each verdict is proved, violated (with a firing
-    sequence, a shortest one where exploring found it) or unknown (with the bound reached); Ctrl-C ends the search and
-    shows what is known so far. A folder stands for the net files (*.firable.yaml) below it, but for those in hidden
-    folders and of what is installed there (virtual environments, node_modules).
+    sequence, a shortest one where exploring found it) or unknown (with the bound reached); Ctrl-C or SIGTERM ends the
+    search and shows what is known so far. A folder stands for the net files (*.firable.yaml) below it, but for those in
+    hidden folders and of what is installed there (virtual environments, node_modules).
 
     With --machines the external gates are no longer free: they open as the machines of the plant allow. What differs
     is shown side by side, and what a fault of each machine leads to.

@@ -18,6 +18,7 @@ from firable.cli.progress import stages
 from firable.cli.protocol import Answered, Asked, ask, protocol_options
 from firable.cli.protocol import show as show_protocol
 from firable.cli.report import Report
+from firable.cli.terminated import terminated_as_by_ctrl_c
 from firable.cli.votes import Votes, is_vote, votes_told
 
 if TYPE_CHECKING:
@@ -47,6 +48,7 @@ SIGNS: Final = {"violated": ("✗", "red"), "unknown": ("?", "yellow"), "proved"
 @protocol_options
 @page_option
 @formats_option
+@terminated_as_by_ctrl_c()
 def prove(
     net: str,
     smt_dir: str | None,
@@ -66,7 +68,7 @@ def prove(
     values of the net's own names that refute it. With --machines the gates that a vote relies on (O4) are asked of the
     loop that the plant closes, instead of being assumed. With --protocol the voting protocol of the split is explored
     as a net of its own, with --faults under faults too, and with --wrong the protocols known to be wrong are tried.
-    Ctrl-C ends what is being done and shows what is known so far.
+    Ctrl-C or SIGTERM ends what is being done and shows what is known so far.
     """
     asked, answered = Asked(protocol, faults, wrong), list[Answered]()
     make = with_page(lambda: _report(net, smt_dir, timeout, machines, asked, answered), page)

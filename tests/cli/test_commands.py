@@ -102,7 +102,8 @@ def test_the_structure_is_told_on_request(capsys: pytest.CaptureFixture[str]) ->
     assert data["reports"][0]["figures"]["structure"]["siphons_without_marked_trap"]
 
 
-def test_an_interrupted_check_shows_what_is_known(tmp_path: Path) -> None:
+@pytest.mark.parametrize("sent", ["SIGINT", "SIGTERM"])
+def test_an_interrupted_check_shows_what_is_known(tmp_path: Path, sent: str) -> None:
     count = 60  # philosophers: far more markings than anyone waits for
     seats = range(count)
     places = [f"  {kind}{i}:" for i in seats for kind in ("thinking", "eating", "fork")]
@@ -125,7 +126,7 @@ def test_an_interrupted_check_shows_what_is_known(tmp_path: Path) -> None:
         "from firable.cli.main import main\n"
         "engine = r._engine.explore\n"
         "def explore(*arguments, **options):\n"
-        "    threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
+        f"    threading.Timer(0.2, os.kill, (os.getpid(), signal.{sent})).start()\n"
         "    r._engine.explore = engine\n"
         "    return engine(*arguments, **options)\n"
         "r._engine.explore = explore\n"

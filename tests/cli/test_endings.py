@@ -2,6 +2,7 @@
 
 import os
 import pty
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -80,6 +81,40 @@ def test_ctrl_c_while_a_class_is_loaded_is_no_fault_of_the_program(
     monkeypatch.setattr("firable.cli.main.import_module", load)
     assert main(["check", "catalogue:one_robot"]) == 3
     assert capsys.readouterr().err == "interrupted: nothing is known yet\n"
+
+
+ASKED_BESIDE = """
+import os, signal, sys, threading, z3
+from firable.cli.terminated import terminated_as_by_ctrl_c
+
+def terminate():
+    os.kill(os.getpid(), signal.SIGTERM)
+
+holes = range(20)  # more pigeons than holes: z3 is at it for as long as anybody waits
+sits = [[z3.Bool(f"{p}-{h}") for h in holes] for p in range(21)]
+solver = z3.Solver()
+solver.add([z3.Or(one) for one in sits])
+solver.add([z3.Not(z3.And(sits[p][h], sits[q][h])) for h in holes for p in range(21) for q in range(p)])
+if sys.argv[1] == "ignored":
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+with terminated_as_by_ctrl_c():
+    threading.Timer(0.3, terminate).start()
+    print(solver.check(), solver.reason_unknown(), flush=True)
+    print(signal.getsignal(signal.SIGTERM) is signal.SIG_DFL)
+print(signal.getsignal(signal.SIGTERM) is signal.SIG_DFL, flush=True)
+terminate()
+"""
+
+
+def test_sigterm_ends_a_solver_in_the_main_thread_and_is_itself_again_afterwards() -> None:
+    done = subprocess.run([sys.executable, "-c", ASKED_BESIDE, ""], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (-signal.SIGTERM, "")
+    assert done.stdout.split() == ["unknown", "interrupted", "from", "keyboard", "False", "True"]
+
+
+def test_sigterm_ends_at_once_what_takes_no_ctrl_c() -> None:
+    done = subprocess.run([sys.executable, "-c", ASKED_BESIDE, "ignored"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGTERM, "", "")
 
 
 def test_a_device_that_is_no_terminal_is_no_closed_one() -> None:
