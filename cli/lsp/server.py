@@ -11,6 +11,7 @@ a net again, and changes no line but its own.
 from __future__ import annotations
 
 import asyncio
+import logging
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -69,6 +70,9 @@ _TYPED: Final = re.compile(r"[\w.-]*$")
 _NOTHING: Final = re.compile("^")
 """What stands of a name before the cursor, and after it nothing."""
 
+_MARK: Final = "\ufeff"
+"""What some editors write before a text, and some leave in what they tell of it: it counts in the columns there."""
+
 _Told = tuple[lsp.Diagnostic, tuple[Cure, ...]]
 """What is told of a verdict, and the changes that cure it."""
 
@@ -95,8 +99,13 @@ class NetServer(LanguageServer):
         self.divided: tuple[str, Sequence[str]] | None = None
 
     def source(self, uri: str) -> Source:
-        """The text of a file as it stands in the editor."""
-        return Source(unquote(urlparse(uri).path) or uri, self.workspace.get_text_document(uri).source)
+        """The text of a file as it stands in the editor, behind its mark if it has one."""
+        text = self.workspace.get_text_document(uri).source.removeprefix(_MARK)
+        return Source(unquote(urlparse(uri).path) or uri, text)
+
+    def mark(self, uri: str, line: int = 1) -> str:
+        """The mark that stands before a line (from 1) of the text; empty where none does."""
+        return _MARK if line == 1 and self.workspace.get_text_document(uri).source.startswith(_MARK) else ""
 
     def names(self, uri: str) -> Names | None:
         """The names in a file; None while it is not YAML."""
@@ -108,6 +117,7 @@ class NetServer(LanguageServer):
     def range(self, uri: str, line: int, column: int, length: int) -> lsp.Range:
         """A part of a line (from 1) in the units of the client."""
         document = self.workspace.get_text_document(uri)
+        column += len(self.mark(uri, line))
         start, end = lsp.Position(line - 1, column - 1), lsp.Position(line - 1, column - 1 + length)
         return document.position_codec.range_to_client_units(self.lines(uri), lsp.Range(start, end))
 
@@ -134,7 +144,8 @@ class NetServer(LanguageServer):
             return None
         document = self.workspace.get_text_document(uri)
         here = document.position_codec.position_from_client_units(self.lines(uri), position)
-        one = names.at(here.line + 1, here.character + 1)
+        line = here.line + 1
+        one = names.at(line, here.character + 1 - len(self.mark(uri, line)))
         return None if one is None else (names, one)
 
     def publish(self, uri: str, found: list[lsp.Diagnostic]) -> None:
@@ -179,7 +190,7 @@ class NetServer(LanguageServer):
 
     def edit(self, uri: str, text: str, old_text: str) -> lsp.WorkspaceEdit:
         """Another text in a file, by the lines that are others: the cursor and what is folded stay as they were."""
-        old, new = _lines(old_text), _lines(text)
+        old, new = (_lines(self.mark(uri) + one) for one in (old_text, text))
         changes = [
             lsp.TextEdit(lsp.Range(lsp.Position(begin, 0), lsp.Position(end, 0)), "".join(new[start:stop]))
             for begin, end, start, stop in _changed(old, new)
@@ -217,6 +228,16 @@ def _changed(old: list[str], new: list[str]) -> Iterator[tuple[int, int, int, in
             yield begin, end, start, stop
 
 
+class _RefusedError(JsonRpcInvalidParams):
+    """What a request asks for is not done, and the editor is told why."""
+
+
+def _is_failure(record: logging.LogRecord) -> bool:
+    """Whether what pygls would log is a failure; it logs all that a request raises, with the traceback."""
+    return record.exc_info is None or not isinstance(record.exc_info[1], _RefusedError)
+
+
+logging.getLogger("pygls.protocol.json_rpc").addFilter(_is_failure)
 server = NetServer()
 
 
@@ -353,7 +374,7 @@ def rename(params: lsp.RenameParams) -> lsp.WorkspaceEdit | None:
         text, names = found[0].renamed(found[1], params.new_name), found[0].renames(found[1], params.new_name)
         parse_positioned(text, source.file)
     except InputError as error:
-        raise JsonRpcInvalidParams(error.diagnostics[0].message) from None
+        raise _RefusedError(error.diagnostics[0].message) from None
     return server.with_layout(server.edit(uri, text, source.text), uri, names)
 
 

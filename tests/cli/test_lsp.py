@@ -402,9 +402,28 @@ def test_names_and_symbols_are_offered_and_columns_are_those_of_the_client(tmp_p
     within(tmp_path / "cell.firable.yaml", act)
 
 
-def told_to_end() -> bytes:
+def test_a_buffer_that_begins_with_a_mark_is_read_and_keeps_it(tmp_path: Path, within: Within) -> None:
+    text = "\ufeff{firable: 1, cell: c, places: {p: , q: }, start: p}\n"
+
+    async def act(one: Editor) -> None:
+        one.open(text)
+        assert not await one.told(lambda _: True)
+        here = one.at(text, "q").position
+        edit = await one.client.text_document_rename_async(lsp.RenameParams(one.document, here, "r"))
+        assert edit is not None
+        assert edit.changes is not None
+        assert applied(text, edit.changes[one.uri]) == text.replace("q", "r")
+        symbols = await one.client.text_document_document_symbol_async(lsp.DocumentSymbolParams(one.document))
+        (q,) = (symbol for symbol in symbols or () if isinstance(symbol, lsp.DocumentSymbol) and symbol.name == "q")
+        assert q.range.start.character == text.index("q")
+
+    within(tmp_path / "cell.firable.yaml", act)
+
+
+def told_to_end(*before: dict[str, Any]) -> bytes:
     asked: list[dict[str, Any]] = [
         {"id": 1, "method": "initialize", "params": {"processId": None, "rootUri": None, "capabilities": {}}},
+        *before,
         {"id": 2, "method": "shutdown"},
         {"method": "exit"},
     ]
@@ -418,6 +437,22 @@ def test_a_server_that_is_told_to_end_ends_well_and_says_nothing_more() -> None:
     )
     assert (ended.returncode, ended.stderr) == (0, b"")
     assert b'"id": 2' in ended.stdout or b'"id":2' in ended.stdout
+
+
+def test_a_rename_that_is_refused_is_told_to_the_editor_alone(tmp_path: Path) -> None:
+    document = {"uri": (tmp_path / "cell.firable.yaml").as_uri()}
+    text = "firable: 1\ncell: c\nplaces: {p: , q: }\n"
+    opened = {"textDocument": {**document, "languageId": "yaml", "version": 1, "text": text}}
+    asked = {"textDocument": document, "position": {"line": 2, "character": 9}, "newName": "q"}
+    sent = told_to_end(
+        {"method": "textDocument/didOpen", "params": opened},
+        {"id": 3, "method": "textDocument/rename", "params": asked},
+    )
+    ended = subprocess.run(
+        [sys.executable, "-m", "firable.cli", "lsp"], input=sent, capture_output=True, timeout=60, check=False
+    )
+    assert (ended.returncode, ended.stderr) == (0, b"")
+    assert b"there is a 'q' already" in ended.stdout
 
 
 def test_a_server_whose_editor_is_gone_ends_and_complains_to_nobody() -> None:
