@@ -151,7 +151,7 @@ def _report(
         tuple(verdicts),
         discipline="interleaving",
         course=(*_told(refinement), f"of the detailed net alone, `firable check` decides: {not_carried()}"),
-        notes=(*loaded.notes, *refinement.notes, *more),
+        notes=(*loaded.notes, *refinement.notes, *loaded.placed(more)),
         table=table,
         files=written,
     )
@@ -222,19 +222,20 @@ def _confirmed(refinement: Refinement, contact_free: Verdict, confirm: bool | No
 
 
 def _table(net: Net) -> tuple[tuple[Coordinated, ...], tuple[Diagnostic, ...]]:
-    """The coordinator table of a net whose parts all have an owner; else nothing, or why there is none."""
+    """The coordinator table of a net; where it cannot be split, nothing, and why: no bundle can be made of it."""
     from dataclasses import replace
 
     from firable.decompose.splitting.cut import split
     from firable.nets.diagnostics import InputError, Severity
 
-    owners = {*(place.owner for place in net.places), *(signal.owner for signal in net.signals)}
-    if None in owners:
-        return (), ()
     try:
         return split(net).table, ()
     except InputError as error:
-        return (), tuple(replace(one, severity=Severity.WARNING, span=None) for one in error.diagnostics)
+        why = (
+            replace(one, message=f"no bundle can be made of the detailed net: {one.message}")
+            for one in error.diagnostics
+        )
+        return (), tuple(replace(one, severity=Severity.WARNING, span=None) for one in why)
 
 
 def _told(refinement: Refinement) -> list[str]:

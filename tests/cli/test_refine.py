@@ -160,6 +160,23 @@ def test_a_violated_property_of_the_conceptual_net_is_told_in_the_detailed_one(
     assert any(player.deadlocked(marking) for marking in player.reachable())
 
 
+def test_a_detailed_net_of_which_no_bundle_can_be_made_is_told_where_the_conceptual_one_is_at_fault(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, output = tmp_path / "net.firable.yaml", tmp_path / "out.firable.yaml"
+    path.write_text(
+        "firable: 1\ncell: c\ncontrollers: {mc: }\nstart: m\nplaces:\n"
+        "  work: {task: {name: process, machine: m, program: O1}}\n  m: {opens: {to: mc.free, machine: MC}}\n"
+        "transitions: {t: {from: m, to: work}, u: {from: work, to: m}}\n"
+    )
+    assert main(["refine", str(path), "-o", str(output)]) == 0
+    assert capsys.readouterr().err.startswith(
+        f"{path}:6:3: warning[F2011]: no bundle can be made of the detailed net: 'work' has no owner"
+    )
+    assert main(["bundle", str(output), "-o", str(tmp_path / "c.bundle")]) == 2
+    assert "error[F2011]: 'work' has no owner" in capsys.readouterr().err
+
+
 def test_evidence_is_written_and_verified(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "evidence"
     code, said = refined(capsys, "catalogue:conceptual_one_robot", "--evidence", str(folder), "--no-confirm")
