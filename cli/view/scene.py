@@ -231,7 +231,7 @@ def _words(piece: Piece) -> str:
 def is_arm(plant: PlantModel, machine: str) -> bool:
     """Whether a machine carries from several stations, or has a hand: it is drawn as an arm, and not as a belt."""
     one = plant.machines[machine]
-    return one.hand is not None or len(carries(plant, machine)) > 1
+    return one.hand is not None or len({source for source, _ in carries(plant, machine)}) > 1
 
 
 def carries(plant: PlantModel, machine: str) -> list[tuple[str, str]]:

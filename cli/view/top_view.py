@@ -1,11 +1,12 @@
 """Where everything of a cell stands in its top view, from its plant file alone.
 
 The plant file has no positions, so this is a sketch, arranged as a cell is sketched on paper: the stations in the order
-of the file from left to right, a belt between the two ends of what carries between two stations, a table where a
-machine works, set back from the line, and an arm before the stations that it reaches. Arms that reach the same stations
-stand on both sides of the line. A machine that only works, at no station that the file names, stands behind them all.
+of the file from left to right, a belt from the station from which a machine carries to the first one to which it does,
+a table where a machine works, set back from the line, and an arm before the stations that it reaches. Arms that reach
+the same stations stand on both sides of the line. A machine that only works, at no station that the file names, stands
+behind them all.
 
-A machine that carries between several stations is an arm whose gripper is a station of its own: what it alone fills and
+A machine that carries from several stations is an arm whose gripper is a station of its own: what it alone fills and
 empties. Units are those of the drawing; the line is y = 0, and what is in front of it has y > 0.
 """
 
@@ -28,9 +29,7 @@ def top_view(plant: PlantModel) -> dict[str, Any]:
     """The places of stations, belts, tables, arms and other machines."""
     grippers = {arm: _grippers(plant, arm) for arm in plant.machines if is_arm(plant, arm)}
     hidden = {station for stations in grippers.values() for station in stations}
-    belts = {
-        name: pairs[0] for name in plant.machines if not is_arm(plant, name) and len(pairs := carries(plant, name)) == 1
-    }
+    belts = {name: pairs[0] for name in plant.machines if not is_arm(plant, name) and (pairs := carries(plant, name))}
     tables = {name: at for name in plant.machines if (at := works_at(plant, name)) is not None and name not in grippers}
     stations = _stations(plant, hidden, set(belts.values()), set(tables.values()))
     arms = _arms(plant, grippers, stations)

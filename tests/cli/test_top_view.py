@@ -82,6 +82,23 @@ def test_a_command_that_is_left_before_its_completion_has_no_effect() -> None:
     assert stage.signal(moving, "robot.at_cv1").busy == {}
 
 
+def test_a_belt_that_carries_out_or_rejects_is_a_belt() -> None:
+    text = PLANTS["one_robot"].read_text("utf-8").replace("cv2_exit]", "cv2_exit, bin]", 1)
+    run = "RUN:     {does: carry, from: cv2_entry, to: cv2_exit, "
+    assert run in text
+    view = top_view(
+        parse_plant(text.replace(run, f"REJECT: {{does: carry, from: cv2_entry, to: bin, takes_s: 1}}\n      {run}"))
+    )
+    assert [*view["belts"]] == ["CV1", "CV2"]
+    assert [*view["arms"]] == ["R"]
+    assert view["belts"]["CV2"] == [*view["stations"]["cv2_entry"], *view["stations"]["bin"]]
+    view = top_view(
+        parse_plant(text.replace(run, f"{run}takes_s: 1}}\n      REJECT: {{does: carry, from: cv2_entry, to: bin, "))
+    )
+    assert view["belts"]["CV2"] == [*view["stations"]["cv2_entry"], *view["stations"]["cv2_exit"]]
+    assert view["stations"]["bin"][1] != view["stations"]["cv2_exit"][1]
+
+
 def test_a_sensor_shows_that_a_workpiece_has_come_and_only_one() -> None:
     stage = Stage(catalogue_net("one_robot"), plant("one_robot"))
     scene = stage.signal(stage.signal(stage.begin(), "conveyor.part_at_entry"), "conveyor.part_at_entry")
