@@ -36,7 +36,7 @@ def run_simulated_of(path: str, bundle: Bundle, cell: SimulatedCell, conduct: Co
         "run",
         path,
         bundle.net,
-        _verdicts(report, cell.workpieces, cell.seed),
+        _verdicts(report, cell.workpieces, cell.seed, is_kept=conduct.journal_path is not None),
         run={**report.to_json(), "workpieces": cell.workpieces, "seed": cell.seed},
     )
 
@@ -66,6 +66,7 @@ def show_simulated(report: Report) -> None:
 
 
 _HELD_HINT = "the same command with `--resume` goes on, once `--say` has told of what no machine can tell of"
+_UNKEPT_HINT = "name a --journal: then a run that is held can be taken up"
 
 
 def _told(_kind: str, sentence: str) -> None:
@@ -88,7 +89,7 @@ def _if_not_reported(tell: Callable[[str, str], None], kind: str, sentence: str)
         tell(kind, sentence)
 
 
-def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, ...]:
+def _verdicts(report: RunReport, workpieces: int, seed: int, *, is_kept: bool) -> tuple[Verdict, ...]:
     from firable.executor import State
     from firable.nets.verdict import Status, Verdict, counted
 
@@ -110,7 +111,7 @@ def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, .
             method,
             bound=reached if ended is Status.UNKNOWN else "",
             subjects=(*_why(report), *map(str, report.situation.blocked)) if ended is Status.VIOLATED else (),
-            hint=_HELD_HINT if report.state is State.HELD else "",
+            hint="" if report.state is not State.HELD else _HELD_HINT if is_kept else _UNKEPT_HINT,
         ),
         Verdict(
             "workpieces-intact",

@@ -17,6 +17,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
+from firable.executor.journal.journal import MemoryJournal
 from firable.executor.links.link import called
 from firable.executor.operating.dispatch import was_taken
 from firable.executor.protocol.commands import Answer
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
 
 UNASKED: Final = "unasked"
 """The kind of note of what was said of a command that nobody asked after."""
+
+UNKEPT: Final = "it has no journal to be taken up by: bring the cell to its initial marking before it is run again"
+"""What there is to do where a run has ended that is held, and nothing keeps where."""
 
 _TELLS: Final = {
     Answer.DONE: "is done",
@@ -76,7 +80,7 @@ async def take_up(run: Host, found: TakingUp) -> None:
             run.note("asked after", place=place, answer=answer.value)
             run.answer(name, place, entry, answer)
             if answer is Answer.UNKNOWN:
-                run.told("held", f"nobody knows what became of the command of '{place}': look, and --say it")
+                run.told("held", f"nobody knows what became of the command of '{place}': look, and say it")
     tell_unasked(run, found.answers)
     goes_on = found.resume and not uncertain(run)
     if not (goes_on or run.operated or run.served):  # then the run ends by telling how the cell stands
@@ -182,7 +186,9 @@ def told(run: Host, found: TakingUp) -> str:
     for place in owed:
         if place not in found.answers and not _is_void(run, place):
             lines.append(f"'{run.net.place(place).command}' of '{place}' was decided and not sent; it will be")
-    if found.is_final and (open_ := uncertain(run)):
+    if (run.stopping or not (run.served or run.operated)) and isinstance(run.journal, MemoryJournal):
+        lines.append(UNKEPT)
+    elif found.is_final and (open_ := uncertain(run)):
         how = "say" if run.served and not run.stopping else "--say"
         lines.append(f"look at the machine and say what it did: {how} {open_[0]}=done, =working or =not-received")
     return "; ".join(lines)

@@ -85,7 +85,16 @@ def test_a_run_that_was_stopped_when_all_workpieces_were_through_has_carried_the
     through: int, situation: Situation, status: Status
 ) -> None:
     report = RunReport(situation, tuple(range(1, through + 1)), (), (), (), {}, 0, 0, {}, 1.0)
-    carried = _verdicts(report, 2, 0)[0]
+    carried = _verdicts(report, 2, 0, is_kept=True)[0]
     assert carried.status is status
     told = {Status.PROVED: "", Status.UNKNOWN: situation.message if through == 2 else "1 went through"}
     assert carried.bound == told[status]
+
+
+def test_a_run_that_ends_held_is_told_to_say_what_became_of_commands_only_with_a_journal() -> None:
+    situation = Situation(State.HELD, (), message="the run was interrupted", is_held=True)
+    report = RunReport(situation, (1,), (), (), (), {}, 0, 0, {}, 1.0)
+    with_journal, without = (_verdicts(report, 2, 0, is_kept=kept)[0] for kept in (True, False))
+    assert with_journal.status is without.status is Status.UNKNOWN
+    assert "`--say`" in with_journal.hint
+    assert without.hint == "name a --journal: then a run that is held can be taken up"

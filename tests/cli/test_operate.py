@@ -108,6 +108,24 @@ def test_an_operator_pauses_steps_resumes_and_stops_a_run_at_once(
     assert main(["replay", str(folder / "run.trace"), "--net", str(bundle)]) == 0
 
 
+def test_a_run_without_a_journal_that_ends_held_does_not_advise_to_say_what_nobody_would_hear(
+    served: tuple[subprocess.Popen[str], str, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    process, address, folder = served
+    until_told(address, "robot.to_cv1", folder, capsys)
+    operate(address, "pause", folder, capsys)
+    operate(address, "step", folder, capsys)
+    operate(address, "emergency-stop", folder, capsys)
+    until_told(address, "latched", folder, capsys)
+    operate(address, "reset", folder, capsys)
+    until_told(address, "say what it did", folder, capsys)
+    operate(address, "stop", folder, capsys)
+    out, _ = process.communicate(timeout=PATIENCE_SECONDS)
+    message = json.loads(out)["reports"][0]["run"]["message"]
+    assert "it has no journal to be taken up by: bring the cell to its initial marking" in message
+    assert "--say" not in message
+
+
 def test_an_operator_resets_an_emergency_stop_says_what_a_machine_did_and_resumes(
     served: tuple[subprocess.Popen[str], str, Path], bundle: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
