@@ -368,7 +368,8 @@ def _arbiters(net: Net) -> Iterator[Diagnostic]:
     taken: dict[str, str] = {}
     for arbiter in net.arbiters:
         subject: Subject = ("arbiters", arbiter.name, "among")
-        if len(set(arbiter.among)) < 2:
+        # A list that is written as one name is told as that, below.
+        if len(set(arbiter.among)) < 2 and not any(written_as_one(one, names, "among") for one in arbiter.among):
             yield Diagnostic(
                 "F2013", f"'{arbiter.name}' has nothing to decide", "name at least two transitions", subject
             )

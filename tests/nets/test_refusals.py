@@ -241,6 +241,8 @@ TABLE = (
         "declare it"),
     net("arbiter with nothing to decide", T + "  t: {}\narbiters: {a: {among: t}}\n", "F2013 5:23",
         "name at least two"),
+    net("arbiter over a list without brackets", T + "  t: {}\n  u: {}\narbiters:\n  a:\n    among: t, u\n",
+        "F2004 8:12", "write `among: [t, u]`"),
     net("two arbiters for one transition", T + "  t: {}\n  u: {}\n"
         "arbiters: {a: {among: [t, u]}, b: {among: [u, t]}}\n",
         ("F2013 6:44", "F2013 6:47"), "a conflict component has one arbiter"),
