@@ -380,7 +380,7 @@ def test_a_run_that_is_stopped_at_a_divergence_tells_it_once() -> None:
         Conduct(watch=Watch.STOP),
     )
     assert report.divergence is not None
-    through, _, machines = _verdicts(report, 3, 0)
+    through, _, machines = _verdicts(report, 3, 0, is_kept=False)
     assert through.subjects[0] == "the machines are not as they are modelled; see machines-as-modelled"
     assert not through.hint, "what to do is said of every such verdict"
     assert report.divergence.message in machines.hint
@@ -390,7 +390,7 @@ def test_the_end_of_a_run_by_a_fault_tells_the_fault_once_and_what_to_do() -> No
     fault = "'R MOVE' of 'robot.to_cv1', sent at 1.0 s, is overdue: 'robot.at_cv1' has not come within 120 s"
     situation = Situation(State.FAULT, (), message=fault)
     report = RunReport(situation, (), (), (), (), {}, 0, 0, {}, 1.0)
-    simulated = _verdicts(report, 1, 0)[0]
+    simulated = _verdicts(report, 1, 0, is_kept=False)[0]
     assert simulated.statement == "1 workpiece goes through the cell"
     for one in (simulated, bound_run._verdict(report, "cell.bind.yaml"), hosting._verdict(situation, ("robot",))):
         assert one.status is Status.VIOLATED
