@@ -57,7 +57,7 @@ _METHODS: Final = {
 REASONS: Final = {
     "markings": "the budget of markings is used up",
     "memory": "the budget of memory is used up",
-    "time": "the budget of time is used up",
+    "time": "the time was over",
     "interrupted": "interrupted",
     "cancelled": "the answer is no longer needed",
 }

@@ -21,7 +21,7 @@ from typing import Any, Final, Generic
 
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
 from firable.analysis.question import Answer, Question, listed, no, unknown, yes
-from firable.analysis.spaces.reachability import ReachabilityGraph
+from firable.analysis.spaces.reachability import REASONS, ReachabilityGraph
 from firable.analysis.spaces.space import S, StateSpace
 from firable.nets.changes import arbitration
 from firable.nets.net import Net
@@ -209,7 +209,7 @@ class Steps:
         player = self.graph.witnesses.player
         for index in range(self.graph.n_markings):
             if self.graph.deadline.over:
-                raise BudgetExceeded("the time is over")
+                raise BudgetExceeded(REASONS["time"])
             for fired, _ in self.graph.successors(index):
                 if len(fired) > 1 and not player.serialisable(fired):
                     found.setdefault(self.graph.witnesses.names(fired), index)

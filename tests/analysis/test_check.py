@@ -38,7 +38,7 @@ def test_a_space_that_is_named_and_is_not_found_in_time_says_so_of_all_that_it_l
     report = check(philosophers(200), budget=Budget(seconds=0), method="symbolic")
     left = [verdict for verdict in report.verdicts if verdict.status is Status.UNKNOWN]
     assert {verdict.name for verdict in left} >= {"contact-free", "deadlock-free", "live"}
-    assert {verdict.bound for verdict in left} == {"decision diagram gave up: max_seconds is over"}
+    assert {verdict.bound for verdict in left} == {"decision diagram gave up: the time was over"}
     assert not any("markings" in verdict.hint for verdict in left)
 
 

@@ -446,8 +446,8 @@ def test_the_time_of_one_search_is_no_reason_why_a_smaller_one_has_too_few_marki
 @pytest.mark.parametrize(
     ("error", "why"),
     [
-        (BudgetExceeded("max_seconds is over"), "the time for evidence was over"),
-        (BudgetExceeded("max_memory_bytes is used up"), "the memory for evidence was used up"),
+        (BudgetExceeded("the time was over"), "the time for evidence was over"),
+        (BudgetExceeded("the budget of memory is used up"), "the memory for evidence was used up"),
         (IncompleteGraph("the exploration ended early: memory"), "the memory for evidence was used up"),
         (IncompleteGraph("the exploration ended early: markings"), "the markings for evidence were used up"),
         (IncompleteGraph(f"5 markings found, 7 edges followed: {REASONS['time']}"), "the time for evidence was over"),

@@ -209,7 +209,7 @@ def test_what_is_known_is_not_lost_where_the_time_ends_over_what_shows_it(
     monkeypatch: pytest.MonkeyPatch, text: str
 ) -> None:
     def too_long(*_: object) -> None:
-        raise BudgetExceeded("max_seconds is over")
+        raise BudgetExceeded("the time was over")
 
     space, query = explore(LATE, deadline=Deadline.after(60)), parse_query(text)
     expected = answer(space, query)

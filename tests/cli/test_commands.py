@@ -362,7 +362,7 @@ def test_a_budget_that_holds_the_markings_and_not_what_is_asked_of_them_is_unkno
     assert data["reports"][0]["figures"]["markings"] == 3000
     found = {verdict["name"]: verdict for verdict in data["reports"][0]["verdicts"]}
     assert found["quasi-live"]["status"] == "unknown"
-    assert "max_memory_bytes is used up" in found["quasi-live"]["bound"]
+    assert "the budget of memory is used up" in found["quasi-live"]["bound"]
 
 
 def test_methods_and_costs_are_told_on_request(capsys: pytest.CaptureFixture[str]) -> None:

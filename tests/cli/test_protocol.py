@@ -81,7 +81,7 @@ def test_asking_more_never_lowers_where_an_obligation_stands(
 
 def _given_up(*_: object, **__: object) -> None:
     sleep(0.002)  # longer than the shortest timeout
-    raise BudgetExceeded("max_seconds is over")
+    raise BudgetExceeded("the time was over")
 
 
 def test_what_is_not_decided_in_time_is_told_with_the_option_for_more(
@@ -93,7 +93,7 @@ def test_what_is_not_decided_in_time_is_told_with_the_option_for_more(
     assert main(["prove", net, "--protocol", "--timeout", "0.001"]) == 3
     told = capsys.readouterr().out
     assert "give each exploration more time (--timeout)" in told
-    assert "no decision diagram: the budget of time is used up after" in told
+    assert "no decision diagram: the time was over after" in told
 
 
 def test_what_exploring_leaves_open_is_decided_by_the_invariant(

@@ -263,7 +263,7 @@ def test_diagram_that_is_not_found_in_time_is_what_the_bound_tells(monkeypatch: 
     found = explore_protocol(load_net("ring"), limits=Limits(Deadline(cancelled=cancelled)))
     for verdict in (*found.safety, found.complete, found.one_token):
         assert verdict.status is Status.UNKNOWN
-        assert verdict.bound.startswith("no decision diagram: the budget of time is used up after ")
+        assert verdict.bound.startswith("no decision diagram: the time was over after ")
         assert verdict.bound.endswith("; a table held 50 markings")
         assert verdict.hint == exploring.MORE_TIME
 

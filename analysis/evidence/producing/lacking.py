@@ -8,7 +8,7 @@ from typing import Final
 NO_TIME: Final = "the time for evidence was over"
 NO_MEMORY: Final = "the memory for evidence was used up"
 NO_MARKINGS: Final = "the markings for evidence were used up"
-_ENDED: Final = {"memory": NO_MEMORY, "markings": NO_MARKINGS, "time": NO_TIME, "seconds": NO_TIME}
+_ENDED: Final = {"memory": NO_MEMORY, "markings": NO_MARKINGS, "time": NO_TIME}
 
 
 class LackingError(Exception):
@@ -18,9 +18,9 @@ class LackingError(Exception):
 def which_ended(error: Exception) -> str:
     """Which budget for evidence ended, of an error that says that one did; of any other what it says.
 
-    >>> which_ended(RuntimeError("max_memory_bytes is used up"))
+    >>> which_ended(RuntimeError("the budget of memory is used up"))
     'the memory for evidence was used up'
-    >>> which_ended(RuntimeError("80 markings found, 95 edges followed: the budget of time is used up"))
+    >>> which_ended(RuntimeError("80 markings found, 95 edges followed: the time was over"))
     'the time for evidence was over'
     """
     said = str(error)

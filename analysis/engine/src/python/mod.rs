@@ -133,8 +133,8 @@ pub(crate) fn answered_by<T: Send>(
     result.map_err(|stop| match (stop, raised) {
         (_, Some(error)) => error,
         (stop, None) => BudgetExceeded::new_err(match stop {
-            Stop::Memory => "max_memory_bytes is used up",
-            Stop::Time => "max_seconds is over",
+            Stop::Memory => "the budget of memory is used up",
+            Stop::Time => "the time was over",
             Stop::Cancelled => "cancelled",
             other => other.as_str(),
         }),
