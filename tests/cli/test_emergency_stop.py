@@ -185,7 +185,7 @@ def test_host_whose_coordinator_is_dead_is_latched_by_its_contact_and_goes_on_wh
         assert "refused: plc: 'button' is not closed" in operate("reset")
         assert "firable_latched 1.0" in operate("metrics")
         lamp.show("button", value=True)
-        until(lambda: "it can be reset; then" in operate("situation"), "that it may be reset")
+        until(lambda: "it can be reset\n  then nothing moves" in operate("situation"), "that it may be reset")
         assert operate("resume").startswith("refused: the run is latched")
         assert operate("reset").startswith("held")
         processes.append(started(*other, "--resume"))
