@@ -428,7 +428,7 @@ def test_a_run_of_layers_on_machines_says_what_each_coordinator_has_decided(
     bundle: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     ended = execute(decomposition_of("one_robot"), SimulatedCell(plant_of("one_robot"), workpieces=1))
-    monkeypatch.setattr(bound_run, "binding_of", lambda _: None)
+    monkeypatch.setattr(bound_run, "binding_for", lambda *_: (None, ()))
     for decided, told in (
         ({"line": 6, "cell": 3}, "between coordinators and controllers\n  decided: 6 by line, 3 by cell\n"),
         ({"line": 9}, "between coordinator and controllers\n\n"),

@@ -3,6 +3,7 @@
 import asyncio
 import sys
 from collections.abc import Iterable
+from dataclasses import replace
 
 import pytest
 from support.cells import decomposition_of, plant_of
@@ -425,7 +426,8 @@ def test_a_host_without_machines_runs_with_the_binding_of_its_cell() -> None:
     async def main() -> None:
         heard, decomposition = Heard(), decomposition_of("one_robot")
         binding = read_binding(catalogue_path("one_robot").with_name("one_robot.bind.yaml"))
-        driver = bound_driver(binding, decomposition.net, own_net(decomposition, ("system",)))
+        without_contact = replace(binding, document=binding.document.model_copy(update={"emergency_stop": {}}))
+        driver = bound_driver(without_contact, decomposition.net, own_net(decomposition, ("system",)))
         assert not driver.devices
         running = asyncio.create_task(driver.run(heard, heard))
         await asyncio.sleep(10)
