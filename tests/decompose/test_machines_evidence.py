@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from support import inspected_cell, together_cell
 from support.bench_cell import PLANT as BENCH
+from support.bench_cell import STARTS
 from support.bundle_mutants import evidence_mutants, verdict_mutants
 from support.examples import some
 from support.remembered import answered, read
@@ -493,24 +494,6 @@ def test_faults_are_asked_of_every_transition_that_is_not_shown_to_be_lost_witho
     evidence |= {LOOP: replace(loop, records=tuple(records)).to_text(), FAILING: alone.to_text()}
     with pytest.raises(InputError, match=r"'loop\.failing\.evidence\.json' is about another net"):
         check_bundle(replace(bundle, verdicts=tuple(verdicts), evidence=evidence))
-
-
-STARTS = """\
-firable: 1
-cell: starts
-controllers:
-  c:
-    start: cold
-    inputs: [entry, hand]
-    places:
-      cold:
-      rests:
-      moves: {send: {machine: R, command: MOVE, to: TABLE}, until: at_table}
-transitions:
-  warm: {from: c.cold, to: c.rests}
-  go: {from: c.rests, to: c.moves}
-  stay: {from: c.moves, to: c.rests}
-"""
 
 
 @pytest.mark.usefixtures("remembering", "unchanged")

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 
 import pytest
 from support.bench_cell import PLANT as BENCH
+from support.bench_cell import STARTS
 
 from firable.analysis.evidence.document import Document, Record, document_from_text
 from firable.analysis.goal import Limits
@@ -15,22 +16,6 @@ from firable.decompose.splitting.cut import split
 from firable.nets.text import parse_net
 from firable.nets.verdict import Status
 
-STARTS = """\
-firable: 1
-cell: starts
-controllers:
-  c:
-    start: cold
-    inputs: [entry, hand]
-    places:
-      cold:
-      rests:
-      moves: {send: {machine: R, command: MOVE, to: TABLE}, until: at_table}
-transitions:
-  warm: {from: c.cold, to: c.rests}
-  go: {from: c.rests, to: c.moves}
-  stay: {from: c.moves, to: c.rests}
-"""
 LOST = "property.loop.live.0"
 """The record on the transition that fires once."""
 

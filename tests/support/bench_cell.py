@@ -39,6 +39,24 @@ sensors:
   c.hand:  {holding: R}
 """
 
+STARTS = """\
+firable: 1
+cell: starts
+controllers:
+  c:
+    start: cold
+    inputs: [entry, hand]
+    places:
+      cold:
+      rests:
+      moves: {send: {machine: R, command: MOVE, to: TABLE}, until: at_table}
+transitions:
+  warm: {from: c.cold, to: c.rests}
+  go: {from: c.rests, to: c.moves}
+  stay: {from: c.moves, to: c.rests}
+"""
+"""A net on that bench with a transition that fires once."""
+
 COMMANDS = {
     **{f"to_{at.lower()}": ("R", "MOVE", (("to", at),)) for at in ("HOME", "ENTRY", "TABLE", "EXIT")},
     **{f"grasp_{at.lower()}": ("R", "GRASP", (("at", at),)) for at in ("HOME", "ENTRY", "TABLE")},
