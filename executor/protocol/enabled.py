@@ -94,7 +94,8 @@ class EnabledSet:
         return mask
 
     def _count(self, step: Iterable[Literal]) -> None:
-        readers, missed, holds, mask = self._readers, self._missed, self._holds, self._mask
+        readers, missed, holds = self._readers, self._missed, self._holds
+        turned: list[int] = []
         for one in step:
             if not holds[one]:
                 holds[one], holds[one ^ 1] = True, False
@@ -102,13 +103,17 @@ class EnabledSet:
                 for t in gaining:
                     left = missed[t] = missed[t] - 1
                     if not left:
-                        mask ^= 1 << t
+                        turned.append(t)
                 for t in losing:
                     left = missed[t]
                     if not left:
-                        mask ^= 1 << t
+                        turned.append(t)
                     missed[t] = left + 1
-        self._mask = mask
+        if turned:  # they stand mostly side by side, and a mask may be wide: so it is copied once
+            lowest, near = min(turned), 0
+            for t in turned:
+                near ^= 1 << t - lowest
+            self._mask ^= near << lowest
 
 
 def literal(bit: int, *, value: bool) -> Literal:
