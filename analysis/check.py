@@ -26,6 +26,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from threading import Event
+from time import monotonic, sleep
 from types import MappingProxyType
 from typing import Any, Final, TypeAlias
 
@@ -52,7 +53,7 @@ from firable.analysis.spaces.space import StateSpace
 from firable.analysis.temporal.queries import as_goal, question_of, temporal_question
 from firable.analysis.verdicts.behaviour import DEADLOCK_FREE, QUESTIONS
 from firable.nets.diagnostics import Diagnostic, InputError
-from firable.nets.net import Net, TemporalProperty
+from firable.nets.net import Net, Property, PropertyKind, TemporalProperty
 from firable.nets.queries import Query
 from firable.nets.temporal import Logic
 from firable.nets.verdict import Cost, Status, Verdict, spelled
@@ -74,6 +75,9 @@ _ALONE_SECONDS: Final = 0.1
 """How long techniques that hold all markings are alone, before others begin beside them."""
 _SPACES_SHARE: Final = 0.6  # of the time, for techniques that hold all markings
 _KNOWING_SECONDS_MAX: Final = 30.0  # for what is known at once
+_WAITED_SHARE: Final = 0.125  # of the time that a graph would take, for sets of markings that would take less
+_WAITED_SHARE_MAX: Final = 0.5  # of the time that is left, for the same
+_WAITED_TURN_SECONDS: Final = 0.02
 _SEEN_SHARE: Final = 0.25  # of the time that is left, for what the markings say that were found and are not all
 _COUNTING_SHARE: Final = 0.5  # of the time that is left, for all markings without a graph
 _COUNTING_SECONDS_MAX: Final = 120.0
@@ -318,13 +322,13 @@ class _Check:
             try:
                 outcome = race([[one] for one in contestants], limits, slices_seconds=None)
                 course += outcome.told
-                if outcome.interrupted:
-                    raise KeyboardInterrupt
-                if outcome.answer is None:
-                    begun.result()
-                else:
+                if outcome.answer is not None:
                     space = outcome.answer.until(self.deadline)  # the race ended it with itself
                     course.append(f"{outcome.winner} was the first to hold all markings: {_size(space)}")
+                if outcome.interrupted:
+                    raise KeyboardInterrupt
+                if space is None:
+                    begun.result()
             except KeyboardInterrupt:  # nothing else is begun, and what is known is reported
                 self.interrupted.set()
                 course.append(INTERRUPTED)
@@ -334,7 +338,12 @@ class _Check:
         return space
 
     def _held_explicitly(self, ends: dict[str, ReachabilityGraph], limits: Limits) -> StateSpace[Any]:
-        """The graph; one that is not whole `ends` is given, by the reason why the engine ended."""
+        """The graph; one that is not whole `ends` is given, by the reason why the engine ended.
+
+        Of each property that is always possible again it would search against the edges, which takes about as long as
+        they took to be found; a diagram looks at all markings at once. So where there are many, it is waited for.
+        """
+        began = monotonic()
         budget = replace(self.budget, memory_bytes=limits.memory_bytes, seconds=None)
         try:
             graph = explore(
@@ -351,6 +360,12 @@ class _Check:
         if not graph.complete:
             ends[str(graph.engine.reason)] = graph
         graph.require_complete()
+        stated = (of for of in self.net.properties if isinstance(of, Property))
+        searches = sum(of.kind is PropertyKind.ALWAYS_POSSIBLE for of in stated)
+        worth_seconds = _WAITED_SHARE * searches * (monotonic() - began)
+        until = _share(limits.deadline, _WAITED_SHARE_MAX).within(worth_seconds)
+        while not until.over and not (limits.second_free is not None and limits.second_free()):
+            sleep(_WAITED_TURN_SECONDS)
         return graph
 
     def _settled(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from threading import Event
+from time import sleep
 from typing import Any
 
 import pytest
@@ -15,13 +16,15 @@ from firable.analysis._engine import IncompleteGraph
 from firable.analysis.check import AGAIN, check
 from firable.analysis.goal import Limits
 from firable.analysis.methods import GOALS, KNOWERS, SPACES, Method
-from firable.analysis.race import Contestant, Outcome
+from firable.analysis.race import Contestant, Outcome, race
 from firable.analysis.report import CheckReport, report_on
 from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
+from firable.analysis.spaces.symbolic import SymbolicSpace, explore_symbolically
 from firable.nets.catalogue import catalogue_net
 from firable.nets.catalogue.processes import philosophers
 from firable.nets.diagnostics import InputError
-from firable.nets.net import Net
+from firable.nets.formula import Holds
+from firable.nets.net import Net, Property, PropertyKind
 from firable.nets.queries import parse_query
 from firable.nets.verdict import Status
 from firable.semantics.trace import Discipline
@@ -58,6 +61,47 @@ def test_a_net_with_more_markings_than_the_first_look_is_decided_the_same(monkey
     assert [(v.name, v.status) for v in raced.verdicts] == [(v.name, v.status) for v in explored.verdicts]
     assert raced.course[0] == "the first 5 markings are not all"
     assert "was the first to hold all markings: 76 markings, 154 edges" in raced.course[-1]
+
+
+@pytest.mark.parametrize(("asked", "winner"), [(200, "decision diagram"), (0, "explicit engine")])
+def test_a_graph_waits_for_sets_where_it_would_be_searched_often(
+    asked: int, winner: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The diagram begins when the graph is there; where nothing is waited for, it does not come to its end."""
+    there = Event()
+
+    def explored(net: Net, discipline: Discipline, budget: Budget, **by: Any) -> ReachabilityGraph:
+        graph = explore(net, discipline, budget, **by)
+        if graph.complete:
+            sleep(0.2)
+            there.set()
+        return graph
+
+    def in_a_diagram(net: Net, limits: Limits) -> SymbolicSpace:
+        assert there.wait(60)
+        if not asked and limits.deadline.cancelled is not None:
+            assert limits.deadline.cancelled.wait(60)
+        return explore_symbolically(net, limits)
+
+    monkeypatch.setattr(module, "FIRST_MARKINGS", 5)
+    monkeypatch.setattr(module, "explore", explored)
+    monkeypatch.setattr("firable.analysis.spaces.symbolic.explore_symbolically", in_a_diagram)
+    again = tuple(Property(f"p{i}", PropertyKind.ALWAYS_POSSIBLE, Holds("robot.free")) for i in range(asked))
+    report = check(replace(catalogue_net("one_robot"), properties=again), of_the_net=False)
+    assert f"{winner} was the first to hold all markings: 40 markings, 70 edges" in report.course
+    assert all(verdict.holds for verdict in report.verdicts)
+
+
+def test_a_graph_that_is_whole_as_ctrl_c_comes_is_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*arguments: Any, **by: Any) -> Outcome[Any]:
+        return replace(race(*arguments, **by), interrupted=True)
+
+    monkeypatch.setattr(module, "FIRST_MARKINGS", 5)
+    monkeypatch.setattr(module, "race", interrupted)
+    report = check(catalogue_net("one_robot"))
+    assert "interrupted" in report.course
+    assert report.figures.markings == 40
+    assert report.verdict("deadlock-free").holds
 
 
 def test_synchronous_steps_are_explored_whatever_their_number(monkeypatch: pytest.MonkeyPatch) -> None:
