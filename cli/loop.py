@@ -119,7 +119,7 @@ def loop_report(
     if loop_file is not None:
         files = write_net(loop_file, report.closed.net)
     if evidence_dir is not None:
-        loops = {"loop": report.asked, "loop.failing": faults.for_good, "loop.repaired": faults.repaired}
+        loops = {"loop": report.asked, "loop.failing": faults.for_good}
         files += write_folder(evidence_dir, _documents(loaded.net.name, loops, allowed))
     figures, course = report.closed.figures, report.closed.course
     if interrupted.is_set() and INTERRUPTED not in course:  # it came when something else was asked

@@ -131,6 +131,10 @@ class Answered:
         verdicts = tuple(verdict for verdict in self.report.verdicts if verdict.name in names)
         return evidence_of_report(replace(self.report, verdicts=verdicts), (), limits)
 
+    def family(self, name: str) -> Family:
+        """The family of this name, which was asked."""
+        return next(family for family in self.families if family.name == name)
+
     def of(self, family: Family) -> dict[str, Verdict]:
         """The verdicts on the properties of a family, by what each is about."""
         found = {verdict.name.removeprefix("property."): verdict for verdict in self.report.verdicts}

@@ -48,6 +48,8 @@ from firable.nets.machines.plant_file import PlantModel
 from firable.nets.net import Net, Property, PropertyKind, TemporalProperty
 from firable.nets.verdict import Status, Verdict, Weight, overall
 
+BUSY: Final = "loop.busy-machines"
+ACCIDENTS: Final = "loop.accidents"
 LIVE: Final = "loop.live"
 _PROPERTY: Final = "cell."
 _HANGS: Final = "from here no transition of the cell ever fires again"
@@ -161,8 +163,7 @@ def live_in(asked: Answered) -> tuple[str, ...]:
 
 def known_live(asked: Answered) -> tuple[str, ...]:
     """The transitions of the cell that are known to be live."""
-    family = next(family for family in asked.families if family.name == LIVE)
-    return tuple(name for name, verdict in asked.of(family).items() if verdict.holds)
+    return tuple(name for name, verdict in asked.of(asked.family(LIVE)).items() if verdict.holds)
 
 
 def without(asked: Answered, lost: Iterable[str]) -> tuple[str, ...]:
@@ -175,13 +176,13 @@ def _families(loop: ClosedLoop) -> Iterator[Family]:
     names = [transition.name for transition in loop.cell.transitions]
     gated = [transition.name for transition in loop.cell.transitions if transition.external]
     yield Family(
-        "loop.busy-machines",
+        BUSY,
         "no machine is given a command while it is at another",
         {"": never("loop.busy", Holds(OVERRUN))},
         hint="wait for the completion of the first command before the second is sent",
     )
     yield Family(
-        "loop.accidents",
+        ACCIDENTS,
         "no machine collides, grasps nothing, or machines what is not there",
         {"": never("loop.accident", Holds(ACCIDENT))},
         hint="the last firing is the accident: what it needs must be a place, a gate or a lock of the machine itself",

@@ -1,10 +1,11 @@
 """What a bundle holds of a cell with its machines: every verdict of each closed loop, with a document that shows it.
 
-There are four loops: commands sent late, for what votes rely on (O4); machines that do not fail; and, where the plant
-file says that some may, one that fails for good, and one that is repaired. Each has questions of its own and a document
-on its net. A verdict is sealed as what the document shows of it: its status, and of which transitions or places it is
-violated. How it was found, the run and the hint stay behind, since the document holds the run of each violation; but a
-verdict that must hold and does not is left as it is, because of it no bundle is made.
+There are three loops with a document each: commands sent late, for what votes rely on (O4); machines that do not fail;
+and, where the plant file says that some may, one that fails for good. The second shows as well that no accident follows
+from a fault, and what follows from one that is repaired (`firable.nets.machines.slower`). A verdict is sealed as what
+the document shows of it: its status, and of which transitions or places it is violated. How it was found, the run and
+the hint stay behind, since the document holds the run of each violation; but a verdict that must hold and does not is
+left as it is, because of it no bundle is made.
 
 What `firable check --machines` tells in one verdict, what stands still after a fault and which places hang, are two
 here, as they were asked. Properties that are not asked of a loop (a deadlock, where a sensor never rests) have none.
@@ -39,7 +40,6 @@ PREFIXES: Final = ("o4.", "loop.", "fault.")
 PLANT: Final = "plant.yaml"
 LOOP: Final = "loop.evidence.json"
 FAILING: Final = "loop.failing.evidence.json"
-REPAIRED: Final = "loop.repaired.evidence.json"
 UNDECIDED: Final = "not decided within the limits"
 
 
@@ -61,9 +61,10 @@ def sealed_loops(
     lost = sealing.add(LOOP, loop, loop.verdicts)[LIVE]
     # A fault takes nothing of what is not live without it: but only of what is shown not to be.
     faults = ask_faults(loop, model, live=without(loop, lost), interrupted=interrupted)
-    for file, asked in ((FAILING, faults.for_good), (REPAIRED, faults.repaired)):
-        if asked is not None:
-            sealing.add(file, asked, asked.verdicts)
+    if faults.for_good is not None:
+        sealing.add(FAILING, faults.for_good, faults.for_good.verdicts)
+    if faults.following is not None:
+        sealing.tell(LOOP, faults.following, faults.following.verdicts)
     return tuple(sealing.verdicts), sealing.files, sealing.lacking
 
 
@@ -92,20 +93,27 @@ class _Sealing:
         self.method = f"closed loop with the machines of the plant {sha256(plant.encode()).hexdigest()}"
         self.verdicts: list[Verdict] = []
         self.files = {PLANT: plant}
+        self.records: dict[str, dict[str, Record]] = {}
+        """For each document, its records by their names."""
         self.lacking: dict[str, str] = {}
 
     def add(self, file: str, asked: Answered, told: Sequence[Verdict]) -> dict[str, list[str]]:
         """Add the document on a loop, and its verdicts; for each of what its violation is shown."""
         document = asked.document(self.limits())
         self.files[file] = document.to_text()
-        records = {record.name: record for record in document.records}
+        self.records[file] = {record.name: record for record in document.records}
+        self.tell(file, asked, told)
+        return {family.name: _shown_to_fail(family, self.records[file]) for family in asked.families}
+
+    def tell(self, file: str, asked: Answered, told: Sequence[Verdict]) -> None:
+        """Add verdicts that a document shows which was added before."""
+        records = self.records[file]
         for family, verdict in zip(asked.families, told, strict=True):
             unproved = verdict.weight is Weight.REQUIRED and not verdict.holds
             self.verdicts.append(verdict if unproved else _as_shown(family, records, file, self.method, verdict.hint))
             of = filter(None, (records.get(f"property.{prop.name}") for prop in family.of.values()))
             if why := next((record.lacking for record in of if record.lacking), ""):
                 self.lacking[family.name] = why
-        return {family.name: _shown_to_fail(family, records) for family in asked.families}
 
 
 def _shown_to_fail(family: Family, records: Mapping[str, Record]) -> list[str]:

@@ -92,16 +92,32 @@ class Asked:
         )
         yield from (self.of_the_file(prop) for prop in self.cell.properties if not self.unclear(prop))
 
+    def of_slower_machines(
+        self, failing: Iterable[str], repaired: Iterable[str], live: Iterable[str]
+    ) -> Iterator[Question]:
+        """What comes of machines that fail, and are repaired, down to what is asked of those that do not fail.
+
+        They are machines that take longer (`firable.nets.machines.slower`); `live` fire again and again without.
+        """
+        asked = {question.name: question.of for question in self.of_the_loop()}
+        if tuple(failing):
+            yield Question(
+                "fault.safe",
+                "no accident follows when a machine fails and is not repaired",
+                {name: asked[name][""] for name in ("loop.busy-machines", "loop.accidents")},
+            )
+        live = tuple(live)
+        for machine in repaired if live else ():
+            yield Question(
+                f"fault.{as_name(machine)}.repaired",
+                f"after {machine} was repaired and goes on, all that is live without faults can fire again",
+                {name: asked["loop.live"][name] for name in live},
+            )
+
     def of_faults(self, live: Iterable[str]) -> Iterator[Question]:
         """What is asked of the cell of which one machine may fail for good; `live` fire again and again without."""
-        failed = _any(Holds(self.of(f"failed {machine}")) for machine in self.plant.may_fail)
-        yield Question(
-            "fault.safe",
-            "no accident follows when a machine fails and is not repaired",
-            {"": _never("fault.accident", And((self.ended, failed)))},
-        )
         live = tuple(live)
-        for machine in self.plant.may_fail if live else ():
+        for machine in self.plant.may_fail:
             its = f"fault.{as_name(machine)}"
             well = Not(Holds(self.of(f"failed {machine}")))
             fires = [Or((well, self.fires(name))) for name in live]
@@ -117,18 +133,6 @@ class Asked:
                 f"when {machine} has failed for good, every place can still lose its token",
                 {p.name: self.possible(f"{its}.p{i}", leaves[i]) for i, p in enumerate(self.cell.places)},
                 Weight.INFORMATION,
-            )
-
-    def of_repairs(self, live: Iterable[str]) -> Iterator[Question]:
-        """What is asked of the cell of which one machine may fail, and is repaired."""
-        live = tuple(live)
-        for machine in self.plant.may_fail if live else ():
-            asked = {n: self.possible(f"repair.{as_name(machine)}.{i}", self.fires(n)) for i, n in enumerate(live)}
-            well = Not(Holds(self.of(f"failed {machine}")))
-            yield Question(
-                f"fault.{as_name(machine)}.repaired",
-                f"after {machine} was repaired and goes on, all that is live without faults can fire again",
-                {**asked, "": self.possible(f"repair.{as_name(machine)}", well)},
             )
 
     # --- What they are made of

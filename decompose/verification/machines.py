@@ -1,8 +1,10 @@
 """The verdicts on a cell with its machines: each loop is closed anew, and its document must show what is asked of it.
 
-A bundle that has them holds the plant file itself, and each verdict names the SHA-256 of it. There are four loops, each
-with a document: of commands sent late, what votes rely on (O4); of machines that do not fail, `loop.*`; of machines of
-which one fails, for good or until it is repaired, `fault.*`. What is asked is stated anew, of O4 here: of each gate
+A bundle that has them holds the plant file itself, and each verdict names the SHA-256 of it. There are three loops with
+a document each: of commands sent late, what votes rely on (O4); of machines that do not fail, `loop.*`; of machines of
+which one fails for good, what comes to stand still then. That a fault is safe, and what comes of one that is repaired,
+follows from the second, once the loops of such machines are seen to be those of machines that take longer
+(`firable.nets.machines.slower`). What is asked is stated anew, of O4 here: of each gate
 that a vote relies on, whether a marking of the loop can be reached in which the part could vote, its places as Eq. (1)
 wants them and the gate open, and a move may close the gate; of the others in `loop_questions`. That a document shows
 this of the loop is checked as of any net.
@@ -14,10 +16,10 @@ machines nobody can show; it is assumed instead of O4.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from hashlib import sha256
-from typing import Final
+from typing import Final, NamedTuple
 
 from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.documents import ShownRecord, checked_document
@@ -33,6 +35,7 @@ from firable.nets.formula import And, Constant, Firable, Formula, Holds, Not, Or
 from firable.nets.machines.closing import close
 from firable.nets.machines.loop import ACCIDENT, OVERRUN, ClosedLoop, Faults, Sending
 from firable.nets.machines.plant_file import PlantModel, parse_plant
+from firable.nets.machines.slower import difference
 from firable.nets.net import ExternalGate, Net, Property, PropertyKind, SignalKind
 from firable.nets.verdict import Status, Verdict
 
@@ -42,7 +45,6 @@ METHOD: Final = "closed loop with the machines of the plant"
 O4: Final = "o4.evidence.json"
 LOOP: Final = "loop.evidence.json"
 FAILING: Final = "loop.failing.evidence.json"
-REPAIRED: Final = "loop.repaired.evidence.json"
 TITLES: Final = {
     "o4": "the machines of the plant keep each gate that a vote relies on (O4)",
     "loop": "what the cell does with its machines, as the plant file says they go",
@@ -69,21 +71,41 @@ def check_machines(examination: Examination, cut: Cut, answers: Answers, timeout
     except InputError as error:
         raise _closes_nothing(error) from None
     judging = _Judging(examination, cut, model, f"{METHOD} {sha256(text.encode()).hexdigest()}", answers, timeout_ms)
-    judging.judge(O4, Sending.LATE, Faults.NONE, lambda loop, _: _asked(cut, loop))
-    lost = judging.judge(LOOP, Sending.AT_ONCE, Faults.NONE, lambda _, asked: asked.of_the_loop())["loop.live"]
+    late, well = (judging.closed(sending, Faults.NONE) for sending in (Sending.LATE, Sending.AT_ONCE))
+    judging.judge(O4, late, _asked(cut, late.loop))
+    shown, against = judging.judge(LOOP, well, well.asked.of_the_loop())
+    lost = against["loop.live"]
     # A fault takes nothing of what is not live without it. What the document has no evidence on may be live, and what
     # it has evidence on that could not be checked in time leaves the verdicts on faults without their premise.
     live = [t.name for t in cut.net.transitions if t.name not in lost]
     judging = replace(judging, premise="" if all(lost.values()) else "it rests on 'loop.live', which is not shown")
-    if Plant(cut.net, model, faults=Faults.FOR_GOOD).may_fail:
-        judging.judge(FAILING, Sending.AT_ONCE, Faults.FOR_GOOD, lambda _, asked: asked.of_faults(live))
-    if live and Plant(cut.net, model, faults=Faults.REPAIRED).may_fail:
-        judging.judge(REPAIRED, Sending.AT_ONCE, Faults.REPAIRED, lambda _, asked: asked.of_repairs(live))
+    if not Plant(cut.net, model, faults=Faults.FOR_GOOD).may_fail:
+        return
+    failing, repaired = (judging.closed(Sending.AT_ONCE, faults) for faults in (Faults.FOR_GOOD, Faults.REPAIRED))
+    for one in (failing, repaired):
+        if told := difference(well.loop.net, one.loop, repaired=one is repaired):
+            raise NotShownError(f"a machine that fails is not one that takes longer: {told}", "evidence", PLANT)
+    for question in well.asked.of_slower_machines(failing.plant.may_fail, repaired.plant.may_fail, live):
+        judging.judge_one(question, LOOP, shown)
+    if live:
+        judging.judge(FAILING, failing, failing.asked.of_faults(live))
 
 
 def _closes_nothing(error: InputError) -> NotShownError:
     message = f"'{PLANT}' closes no loop with the net: {error.diagnostics[0].message}"
     return NotShownError(message, "evidence", PLANT)
+
+
+class _Closed(NamedTuple):
+    """A loop, and the second reading of the plant file that it was held against."""
+
+    plant: Plant
+    loop: ClosedLoop
+
+    @property
+    def asked(self) -> Asked:
+        """The questions to it."""
+        return Asked(self.plant, self.loop.net)
 
 
 @dataclass(frozen=True)
@@ -99,13 +121,8 @@ class _Judging:
     premise: str = ""
     """What the verdicts rest on and is only claimed, if anything."""
 
-    def judge(
-        self, file: str, sending: Sending, faults: Faults, ask: Callable[[ClosedLoop, Asked], Iterable[Question]]
-    ) -> dict[str, dict[str, bool]]:
-        """Judge the verdicts that one document shows, of one loop.
-
-        For each of them, of what there is evidence that it is violated, and whether that is shown.
-        """
+    def closed(self, sending: Sending, faults: Faults) -> _Closed:
+        """One loop, once it is seen to be what the plant file says."""
         plant = Plant(self.cut.net, self.model, sending, faults)
         try:
             loop = close(self.cut.net, self.model, faults, sending)
@@ -118,10 +135,19 @@ class _Judging:
             raise NotShownError(message, "evidence", PLANT) from None
         except InputError as error:
             raise _closes_nothing(error) from None
-        questions = list(ask(loop, Asked(plant, loop.net)))
-        net = replace(loop.net, properties=tuple(prop for one in questions for prop in one.of.values()))
+        return _Closed(plant, loop)
+
+    def judge(
+        self, file: str, closed: _Closed, questions: Iterable[Question]
+    ) -> tuple[dict[str, ShownRecord], dict[str, dict[str, bool]]]:
+        """Judge the verdicts that one document shows, of one loop: what it says, of each property by its name.
+
+        And for each verdict, of what there is evidence that it is violated, and whether that is shown.
+        """
+        questions = list(questions)
+        net = replace(closed.loop.net, properties=tuple(prop for one in questions for prop in one.of.values()))
         records = self.records(file, net)
-        return {question.name: self.judge_one(question, file, records) for question in questions}
+        return records, {question.name: self.judge_one(question, file, records) for question in questions}
 
     def records(self, file: str, net: Net) -> dict[str, ShownRecord]:
         """What a document says of the properties of a loop, by their names; of nothing else."""

@@ -145,9 +145,9 @@ def test_the_evidence_on_each_loop_is_written_and_verified(tmp_path: Path, capsy
     folder = tmp_path / "evidence"
     assert main(["check", CELL, "--machines", PLANT, "--evidence", str(folder)]) == 0
     told = capsys.readouterr().out
-    loops = ("loop", "loop.failing", "loop.repaired")
+    loops = ("loop", "loop.failing")
     assert sorted(path.name for path in folder.iterdir()) == [f"one-robot.{loop}.evidence.json" for loop in loops]
-    for loop, said in zip(loops, ("property.loop.live.0", "property.fault.R.t0", "property.repair.R"), strict=True):
+    for loop, said in zip(loops, ("property.loop.live.0", "property.fault.R.t0"), strict=True):
         path = str(folder / f"one-robot.{loop}.evidence.json")
         assert f"evidence: firable verify {path}\n" in told
         assert main(["verify", path]) == 0
@@ -310,18 +310,14 @@ def begun(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 def test_one_ctrl_c_ends_all_explorations_of_a_cell_with_its_machines(
     begun: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["check", CELL, "--machines", PLANT]) == 3
+    assert main(["check", CELL, "--machines", PLANT]) == 0, "all that must hold was known before"
     assert len(begun) == 2, "of the loop, and of the net with gates free"
     told = capsys.readouterr().out
     assert "746 markings and 1,976 edges\n  5 markings with gates free so far\n" in told
     assert "\n  interrupted\n" in told
     assert "  deadlock-free                       unknown     proved\n" in told
     assert "✓ proved    loop.deadlock-free" in told
-    for fault in ("fault.safe", "fault.MC", "fault.MC.repaired"):
-        told_of_it = (
-            rf"\? unknown   {fault} .*\n(?: .*\n)*? +reached: interrupted\n +hint: .*ask again, and let it come"
-        )
-        assert re.search(told_of_it, told), fault
+    assert re.search(r"\? unknown   fault\.MC .*\n +reached: interrupted\n +hint: .*ask again, and let it come", told)
 
 
 def test_one_ctrl_c_ends_all_explorations_for_a_bundle(

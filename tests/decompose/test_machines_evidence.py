@@ -14,7 +14,7 @@ from support.examples import some
 from support.remembered import answered, read
 
 from firable.analysis.check import check
-from firable.analysis.evidence.document import Document, Record, document_from_text
+from firable.analysis.evidence.document import Record, document_from_text
 from firable.analysis.goal import Limits
 from firable.decompose.bundling import make_bundle
 from firable.decompose.proofs import closed_loops
@@ -31,7 +31,6 @@ from firable.decompose.verification.machines import (
     O4,
     PLANT,
     PREFIXES,
-    REPAIRED,
     check_machines,
 )
 from firable.decompose.verification.recut import Cut
@@ -50,7 +49,7 @@ from firable.nets.text import parse_net
 from firable.nets.verdict import Status
 
 TIMEOUT_MS = 10_000
-FILES = {PLANT, O4, LOOP, FAILING, REPAIRED}
+FILES = {PLANT, O4, LOOP, FAILING}
 
 
 def plant() -> str:
@@ -408,7 +407,7 @@ def test_evidence_on_the_machines_that_is_missing_or_exchanged_is_refused() -> N
     mutants = [
         (how, make) for how, make in evidence_mutants(bundled()) if how.startswith(tuple(FILES)) and how not in others
     ]
-    assert len(mutants) > 25
+    assert len(mutants) > 18
     for how, make in some(mutants, 1):
         assert refused(make()), how
 
@@ -473,26 +472,20 @@ def test_the_machines_of_another_cell_are_refused() -> None:
 def test_faults_are_asked_of_every_transition_that_is_not_shown_to_be_lost_without_them() -> None:
     """A loss that is claimed, and shown by nothing, would take the questions on faults away, which it is asked for."""
     bundle = bundled()
-    loop, failing = (document_from_text(bundle.evidence[file]) for file in (LOOP, FAILING))
+    loop = document_from_text(bundle.evidence[LOOP])
     records = [
         Record(record.name, False, (), "the time was over") if ".loop.live." in record.name else record
         for record in loop.records
     ]
-    accident = next(prop for prop in failing.net.properties if prop.name == "fault.accident")
-    alone = Document(
-        replace(failing.net, properties=(accident,)),
-        failing.discipline,
-        tuple(r for r in failing.records if r.name == "property.fault.accident"),
-    )
     verdicts = [v for v in bundle.verdicts if not v.name.startswith("fault.") or v.name == "fault.safe"]
     every = tuple(t.name for t in bundle.net.transitions)
     verdicts = [
         replace(v, status=Status.VIOLATED, evidence=(), subjects=every) if v.name == "loop.live" else v
         for v in verdicts
     ]
-    evidence = {file: text for file, text in bundle.evidence.items() if file != REPAIRED}
-    evidence |= {LOOP: replace(loop, records=tuple(records)).to_text(), FAILING: alone.to_text()}
-    with pytest.raises(InputError, match=r"'loop\.failing\.evidence\.json' is about another net"):
+    evidence = {file: text for file, text in bundle.evidence.items() if file != FAILING}
+    evidence |= {LOOP: replace(loop, records=tuple(records)).to_text()}
+    with pytest.raises(InputError, match=r"there is no verdict on 'fault\.R\.repaired'"):
         check_bundle(replace(bundle, verdicts=tuple(verdicts), evidence=evidence))
 
 
