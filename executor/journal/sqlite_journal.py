@@ -287,7 +287,7 @@ def refuse_taken_over(path: Path | str) -> None:
     where = "" if journal is None else f" in {printable(_from_here(str(journal)))}"
     message = f"{printable(str(path))}: the journal was taken over: '{printable(net)}' goes on{where}"
     hint = "run that one; both would command the same machines"
-    if not all(map(_is_written, journals)):
+    if not all(map(is_written, journals)):
         mark_shown = printable(_from_here(str(mark)))
         hint = (
             "run it where its journals were brought; where the takeover was broken off, and not all of them were ever "
@@ -296,10 +296,10 @@ def refuse_taken_over(path: Path | str) -> None:
     raise InputError([Diagnostic("F5036", message, hint)])
 
 
-def _is_written(journal: Path) -> bool:
+def is_written(journal: Path | str) -> bool:
     """Whether something stands in a journal, as far as that can be seen here."""
     try:
-        return journal.is_file() and journal.stat().st_size > 0
+        return Path(journal).is_file() and Path(journal).stat().st_size > 0
     except (OSError, ValueError):
         return False
 

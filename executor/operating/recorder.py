@@ -22,7 +22,7 @@ import json
 import os
 import stat
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from dataclasses import replace
 from functools import partial
 from io import FileIO
@@ -70,7 +70,7 @@ class TraceFile:
         self.is_writing = False
         self.cut_at: int | None = size_bytes
         """Where the file is cut before the first line; None when that is done."""
-        with self._failures():
+        with _failures(self.path):
             mode = "r+" if size_bytes or Path(path).is_file() else "w"
             # No buffer, whose lock a write that hangs would hold.
             self.file = FileIO(path, mode, opener=open_at_once)
@@ -95,7 +95,7 @@ class TraceFile:
         """Write lines with their ends, whole; on any thread."""
         self.is_writing = True
         try:
-            with self._failures():
+            with _failures(self.path):
                 if self.cut_at is not None:
                     self._cut(self.cut_at)
                     self.cut_at = None
@@ -111,26 +111,42 @@ class TraceFile:
     def close(self) -> None:
         """Close the file; again, or where a write hangs, it does nothing."""
         if not self.is_writing:
-            with self._failures():
+            with _failures(self.path):
                 self.file.close()
 
-    @contextmanager
-    def _failures(self) -> Iterator[None]:
-        try:
-            yield
-        except (OSError, ValueError) as error:  # ValueError: a path with a NUL in it
-            reason = error.strerror if isinstance(error, OSError) else str(error)
-            message = f"{printable(str(self.path))}: the trace cannot be written: {reason}"
-            hint = "name a file in a folder that you may write to"
-            if reason in {_SHORT, _TORN}:
-                hint = (
-                    "put the trace of this run back as it was, or leave --trace out: it cannot be begun in the middle"
-                )
-            if reason == UNREAD:
-                hint = "start who reads it before the run, or name a file"
-            if isinstance(error, OSError) and error.errno in {errno.ENOSPC, errno.EDQUOT}:
-                hint = "make room on its disk; with --journal, the same command then takes the run up"
-            raise InputError([Diagnostic("F1017", message, hint)]) from None
+
+@contextmanager
+def _failures(path: Path | str) -> Iterator[None]:
+    try:
+        yield
+    except (OSError, ValueError) as error:  # ValueError: a path with a NUL in it
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        message = f"{printable(str(path))}: the trace cannot be written: {reason}"
+        hint = "name a file in a folder that you may write to"
+        if reason in {_SHORT, _TORN}:
+            hint = "put the trace of this run back as it was, or leave --trace out: it cannot be begun in the middle"
+        if reason == UNREAD:
+            hint = "start who reads it before the run, or name a file"
+        if isinstance(error, OSError) and error.errno in {errno.ENOSPC, errno.EDQUOT}:
+            hint = "make room on its disk; with --journal, the same command then takes the run up"
+        raise InputError([Diagnostic("F1017", message, hint)]) from None
+
+
+def room_for(path: Path | str) -> AbstractContextManager[object]:
+    """Raise `InputError` F1017 where no trace can be, as far as that is seen without making one.
+
+    Be in what is returned until the trace is open: a pipe that is let go of before would have ended for its reader.
+    """
+    with _failures(path):
+        if Path(path).exists():
+            return closing(TraceFile(path))
+        if str(path).endswith("/"):
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        folder = Path(os.path.realpath(path)).parent
+        Path(folder, "..").stat()  # which no file has
+        if not os.access(folder, os.W_OK | os.X_OK, effective_ids=True):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    return nullcontext()
 
 
 TRACE: Final = "\ntrace"

@@ -22,8 +22,17 @@ from typing import Final
 
 from firable.executor.cell.cell_log import PUT_BACK, CellLog
 from firable.executor.journal.journal import Journal, MemoryJournal
-from firable.executor.journal.sqlite_journal import SqliteJournal
-from firable.executor.operating.recorder import CELL, KEY, TRACE, LineStream, Recorder, TraceFile, size_bytes_of
+from firable.executor.journal.sqlite_journal import SqliteJournal, is_written
+from firable.executor.operating.recorder import (
+    CELL,
+    KEY,
+    TRACE,
+    LineStream,
+    Recorder,
+    TraceFile,
+    room_for,
+    size_bytes_of,
+)
 from firable.executor.operating.whereabouts import AT, MACHINES, Elsewhere, elsewhere
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.deciders import coordinators
@@ -86,6 +95,10 @@ def opened(
     """
     net = decomposition.net
     with ExitStack() as stack:
+        if isinstance(trace, Path | str):  # before a journal is made, which a run that is refused would leave there
+            stack.enter_context(room_for(trace))
+            if journal_path is not None and not is_written(journal_path):
+                _demand_an_empty_one(trace, is_taken_over=False)
         journal: Journal = MemoryJournal()
         cell = None
         names = machines or (*coordinators(decomposition), *(subnet.name for subnet in decomposition.subnets))

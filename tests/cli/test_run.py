@@ -1,11 +1,13 @@
 """`firable run` with an operator at the terminal: steps, stops, Ctrl-C, and the files that a run may write."""
 
 import json
+import os
 import re
 import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -219,6 +221,54 @@ def test_a_refused_run_leaves_an_older_trace_as_it_is(bundle: str, tmp_path: Pat
 def test_a_trace_whose_name_no_file_can_have_is_refused(bundle: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", bundle, "--workpieces", "1", "--trace", "n" * 5000]) == 2
     assert "error[F1017]" in capsys.readouterr().err
+
+
+def is_where_nobody_may_write(folder: Path) -> Path:
+    (folder / "traces").mkdir(mode=0o500)
+    return folder / "traces" / "trace"
+
+
+def has_lines(folder: Path) -> Path:
+    (folder / "trace").write_text("of another run\n", encoding="utf-8")
+    return folder / "trace"
+
+
+def is_a_pipe_that_nobody_reads(folder: Path) -> Path:
+    os.mkfifo(folder / "trace")
+    return folder / "trace"
+
+
+@pytest.mark.parametrize(
+    ("trace_in", "reason"),
+    [
+        (has_lines, "begins anew, and this file has lines"),
+        (is_a_pipe_that_nobody_reads, "it is a pipe that nobody reads"),
+        (lambda folder: folder, "Is a directory"),
+        (lambda folder: f"{folder}/traces/", "Is a directory"),
+        (lambda folder: folder / "traces" / "trace", "No such file or directory"),
+        (lambda folder: has_lines(folder) / "trace", "Not a directory"),
+        (lambda folder: folder / ("n" * 300), "File name too long"),
+        (is_where_nobody_may_write, "Permission denied"),
+    ],
+)
+def test_a_run_that_is_refused_for_its_trace_leaves_no_journal(
+    bundle: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    trace_in: Callable[[Path], Path | str],
+    reason: str,
+) -> None:
+    if trace_in is is_where_nobody_may_write:  # whoever runs the tests may write anywhere
+        monkeypatch.setattr(os, "access", lambda *_, **__: False)
+    trace = trace_in(tmp_path)
+    before = set(tmp_path.iterdir())
+    command = ["run", bundle, "--workpieces", "1", "--journal", str(tmp_path / "cell.journal"), "--trace", str(trace)]
+    assert main(command) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("error[F1017]")
+    assert reason in said
+    assert set(tmp_path.iterdir()) == before
 
 
 def test_a_trace_does_not_go_to_standard_output(
