@@ -51,7 +51,7 @@ NOWHERE: Final[Mapping[str, str]] = MappingProxyType({})
 
 
 class On(StrEnum):
-    """On what a run commands. Its journal tells where that stands, and nothing of what stands elsewhere."""
+    """On what a run commands, in the words of its journal, which tells where that stands and not what is elsewhere."""
 
     MACHINES = "the machines of a binding"
     SIMULATED = "a simulated cell"
@@ -132,11 +132,14 @@ def _demand_what_it_is_on(path: Path | str, journal: Journal, on: On, names: Col
     if not any(journal.kept(name) for name in names):
         journal.write(MACHINES, [Keep(ON, on.value)])
     elif (before := journal.kept(MACHINES).get(ON)) != on:
-        message = (
-            f"{printable(str(path))}: the journal is of a run on {printable(str(before))}, and this one is on {on}"
-        )
+        message = f"{printable(str(path))}: the journal is of {_run_on(str(before))}, and this is {_run_on(on)}"
         hint = "name another journal: the machines of this run are not where that one has left its own"
         raise InputError([Diagnostic("F5031", message, hint)])
+
+
+def _run_on(on: str) -> str:
+    """What an operator calls a run on that."""
+    return "a dry run" if on == On.NOTHING else f"a run on {printable(on)}"
 
 
 def _moved(decomposition: Decomposition, journal: Journal, at: Mapping[str, str]) -> Elsewhere | None:

@@ -17,6 +17,11 @@ from firable.nets.bundle import Bundle, read_bundle
 from firable.nets.catalogue import catalogue_path
 from firable.nets.diagnostics import InputError
 
+RUNS = {
+    On.MACHINES: "a run on the machines of a binding",
+    On.SIMULATED: "a run on a simulated cell",
+    On.NOTHING: "a dry run",
+}
 PLANT = ("--plant", "catalogue:one_robot", "--workpieces", "1")
 
 
@@ -46,7 +51,7 @@ def test_a_journal_of_a_run_on_something_else_is_refused(one_robot: Path, tmp_pa
             (problem,) = refusal.value.diagnostics
             assert (problem.code, problem.message) == (
                 "F5031",
-                f"{journal}: the journal is of a run on {on}, and this one is on {other}",
+                f"{journal}: the journal is of {RUNS[on]}, and this is {RUNS[other]}",
             )
 
 
@@ -70,7 +75,7 @@ def test_machines_do_not_go_on_where_a_simulation_has_stopped(
         (On.NOTHING, [*as_hosts, "--dry-run", "1"]),
     ):
         assert main(["run", str(one_robot), *arguments, "--journal", journal, "--resume"]) == 2
-        assert f"error[F5031]: {journal}: the journal is of a run on {On.SIMULATED}, and this one is on {on}" in (
+        assert f"error[F5031]: {journal}: the journal is of a run on a simulated cell, and this is {RUNS[on]}" in (
             capsys.readouterr().err
         )
     assert main(["takeover", str(one_robot), str(later), "--journal", journal, "--into", taken]) == 0
