@@ -105,9 +105,17 @@ class Options(BaseModel):
     def far_end(self) -> object:
         """What is equal of two devices that are one, however each is spoken with; by default all options.
 
-        A text of it is the same in each process, and holds no secret: journals keep it, and it is told (`whereabouts`).
+        Where it is not sure whether two are one, it is equal: nothing is written by two that may be one.
         """
         return self
+
+    def stands_at(self) -> str:
+        """Where the device is, in words that differ of two that may be two; by default the far end, if that is a text.
+
+        They are the same in each process, and hold no secret: journals keep them, and they are told (`whereabouts`).
+        """
+        far_end = self.far_end()
+        return far_end if isinstance(far_end, str) else ""
 
     def point_problem(self, point: Point) -> str:
         """What is wrong with a point of a device with these options, which is right for its kind; empty for nothing."""

@@ -147,9 +147,14 @@ class OpcUaOptions(Options):
         return {int(index): uri for index, uri in self.namespaces.items()}
 
     def far_end(self) -> object:
-        """The server at an address; what stands behind that only chooses among the ways to speak with it."""
+        """What is at a port: mostly one server, of whose endpoints the path chooses one."""
         parts = urlsplit(self.url)
         return f"{one_name(str(parts.hostname))}:{parts.port}"
+
+    def stands_at(self) -> str:
+        """The port with the path, by which several servers may share it (OPC UA, Part 6, 7.1.2.3)."""
+        path = urlsplit(self.url).path
+        return f"{self.far_end()}{'' if path == '/' else path}"
 
 
 class OpcUaConnection(Stepwise):

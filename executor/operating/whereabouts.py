@@ -6,8 +6,11 @@ was, the second must not, and no program can tell them apart. So the journal kee
 and a run that finds one elsewhere is held, whatever was said beforehand, until a person has said that these are the
 machines. Before that nobody asks them what became of a command: what others would say of its number is no answer.
 
-It is told by machine and not by device, as what a binding calls its devices moves nothing. Where a kind of device has
-no text of its far end, its name alone is kept.
+It is told by machine and not by device, as what a binding calls its devices moves nothing. Where a kind of device does
+not say where it stands, its name alone is kept. What may be another machine is another one here, as the path of an OPC
+UA server at the same port: a machine that is held until somebody has said that it is the one costs a minute, and one
+that is taken for another is moved from where it is not. What may be the same device is one where it is asked who writes
+what (`Options.far_end`).
 
 Rejected: to refuse such a journal. Whoever gives a controller another address would lose where the workpieces are.
 """
@@ -57,16 +60,14 @@ class Elsewhere:
 
 
 def machines_at(binding: Binding, net: Net) -> dict[str, str]:
-    """Where each machine is that a binding has commands for: the kind of its device, its far end, a topic at a broker.
+    """Where each machine is that a binding has commands for: the kind of its device, its place, a topic at a broker.
 
     One that is commanded at several devices is at all of them.
     """
     found: dict[str, set[str]] = {}
     for place, one in binding.document.commands.items():
-        device, far_end = binding.document.devices[one.device], binding.options[one.device].far_end()
-        at = device.driver
-        if isinstance(far_end, str):
-            at += f" {far_end}"
+        device, stands_at = binding.document.devices[one.device], binding.options[one.device].stands_at()
+        at = f"{device.driver} {stands_at}" if stands_at else device.driver
         if binding.kinds[one.device].through_broker:
             at += f" {device.channels[one.channel].asks}"
         if (command := net.place(place).command) is not None:

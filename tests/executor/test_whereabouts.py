@@ -64,8 +64,17 @@ def test_a_machine_is_at_the_far_end_of_its_device_however_that_is_called_and_sp
     assert tcp("driver: modbus-tcp, host: plc.cell, port: 503, unit: 2") == {"R": "modbus-tcp plc.cell:503 unit 2"}
     assert tcp("driver: modbus-rtu, port: /dev/ttyS0") == {"R": "modbus-rtu /dev/ttyS0 unit 1"}
     assert bound("driver: serial, port: /dev/ttyS0") == {"R": "serial /dev/ttyS0"}
-    nodes = "number: ns=2;s=n, done: ns=2;s=d"
-    assert bound("driver: opcua, url: 'opc.tcp://plc:4840/x'", channel=nodes) == {"R": "opcua plc:4840"}
+
+
+def test_servers_that_share_a_port_are_told_apart_by_their_paths() -> None:
+    """As the path comes with the first message, a listener can have a server for each."""
+
+    def at(rest: str) -> dict[str, str]:
+        return bound(f"driver: opcua, url: 'opc.tcp://{rest}'", channel="number: ns=2;s=n, done: ns=2;s=d")
+
+    assert at("plc:4840/left") == at("PLC.:4840/left") == {"R": "opcua plc:4840/left"}
+    assert at("plc:4840/right") == {"R": "opcua plc:4840/right"}
+    assert at("plc:4840") == at("me:word@plc:4840/") == {"R": "opcua plc:4840"}
 
 
 def test_a_machine_behind_a_broker_is_at_the_topic_of_its_commands() -> None:

@@ -181,6 +181,17 @@ def test_a_device_is_the_same_however_it_is_spoken_with(driver: str, one: str, s
     assert options(driver, one).far_end() != options(driver, other).far_end()
 
 
+def test_servers_that_share_a_port_may_be_one_and_are_taken_for_one() -> None:
+    """Two hosts would stop each other's machines, where both paths lead to one server."""
+    opcua = "driver: opcua, url: 'opc.tcp://plc:4840/{}', safe: {{ns=2;s=stop: true}}"
+    text = two_devices(opcua.format("left"), opcua.format("right"))
+    for register, node in (("holding 1", "ns=2;s=left"), ("holding 2", "ns=2;s=right")):
+        text = text.replace(f"number: {register}", f"number: {node}")
+    ((code, subject, message),) = refused(parse_binding(text), TWO, own_net(split(TWO), ["a"]))
+    assert (code, subject) == ("F5105", ("devices", "left"))
+    assert "as 'right' does, which is another host's at the same address" in message
+
+
 def test_simulated_devices_are_never_one() -> None:
     assert options("simulated", "seconds: 1").far_end() != options("simulated", "seconds: 1").far_end()
 
