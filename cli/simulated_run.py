@@ -36,7 +36,13 @@ def run_simulated_of(path: str, bundle: Bundle, cell: SimulatedCell, conduct: Co
         "run",
         path,
         bundle.net,
-        _verdicts(report, cell.workpieces, cell.seed, is_kept=conduct.journal_path is not None),
+        _verdicts(
+            report,
+            cell.workpieces,
+            cell.seed,
+            is_kept=conduct.journal_path is not None,
+            awaits_another=_awaits_another(report, cell),
+        ),
         run={**report.to_json(), "workpieces": cell.workpieces, "seed": cell.seed},
     )
 
@@ -67,6 +73,10 @@ def show_simulated(report: Report) -> None:
 
 _HELD_HINT = "the same command with `--resume` goes on, once `--say` has told of what no machine can tell of"
 _UNKEPT_HINT = "name a --journal: then a run that is held can be taken up"
+_LAST_HINT = (
+    "where each workpiece is pushed on by the next one, the last stay inside, however many `--workpieces` come; "
+    "where they are not to, let the cell carry them out without a next one"
+)
 
 
 def _told(_kind: str, sentence: str) -> None:
@@ -89,7 +99,9 @@ def _if_not_reported(tell: Callable[[str, str], None], kind: str, sentence: str)
         tell(kind, sentence)
 
 
-def _verdicts(report: RunReport, workpieces: int, seed: int, *, is_kept: bool) -> tuple[Verdict, ...]:
+def _verdicts(
+    report: RunReport, workpieces: int, seed: int, *, is_kept: bool, awaits_another: bool = False
+) -> tuple[Verdict, ...]:
     from firable.executor import State
     from firable.nets.verdict import Status, Verdict, counted
 
@@ -103,6 +115,13 @@ def _verdicts(report: RunReport, workpieces: int, seed: int, *, is_kept: bool) -
         ended = Status.PROVED
     reached = report.situation.message if all_through else f"{through} went through"
     intact = not report.lost and not report.doubled
+    why, hint = [*_why(report)], ""
+    if report.state is State.HELD:
+        hint = _HELD_HINT if is_kept else _UNKEPT_HINT
+    elif awaits_another:
+        stay = "stays" if len(report.inside) == 1 else "stay"
+        why.append(f"{len(report.inside)} of {counted(workpieces, 'workpiece')} {stay} inside until another one comes")
+        hint = _LAST_HINT
     verdicts = [
         Verdict(
             "workpieces-carried-through",
@@ -110,8 +129,8 @@ def _verdicts(report: RunReport, workpieces: int, seed: int, *, is_kept: bool) -
             f"{counted(workpieces, 'workpiece')} {'goes' if workpieces == 1 else 'go'} through the cell",
             method,
             bound=reached if ended is Status.UNKNOWN else "",
-            subjects=(*_why(report), *map(str, report.situation.blocked)) if ended is Status.VIOLATED else (),
-            hint="" if report.state is not State.HELD else _HELD_HINT if is_kept else _UNKEPT_HINT,
+            subjects=(*why, *map(str, report.situation.blocked)) if ended is Status.VIOLATED else (),
+            hint=hint,
         ),
         Verdict(
             "workpieces-intact",
@@ -129,3 +148,19 @@ def _why(report: RunReport) -> Iterator[str]:
     found, message = report.divergence, report.situation.message
     if message:
         yield message if found is None else message.replace(f": {found}", "; see machines-as-modelled")
+
+
+def _awaits_another(report: RunReport, cell: SimulatedCell) -> bool:
+    """Whether workpieces are inside, and every transition that could fire waits for another one to come."""
+    from firable.executor import State
+
+    sensors, arrivals = cell.plant.sensors, cell.plant.arrivals.station
+    comes = {(name, True) for name, sensor in sensors.items() if sensor.occupied == arrivals}
+    return (
+        report.state is State.WAITING
+        and bool(report.inside)
+        and all(
+            one.gates and comes.issuperset(one.gates) and not (one.untaken or one.unread)
+            for one in report.situation.blocked
+        )
+    )

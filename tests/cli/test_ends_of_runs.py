@@ -35,6 +35,36 @@ signals: {robot.worked: acknowledged}
 commands: {robot.working: {device: R, channel: R, write: {}}}
 """
 
+PUSHED = """\
+firable: 1
+cell: pushed
+controllers:
+  belt:
+    start: empty
+    inputs: part_there
+    places:
+      empty:
+      pushing: {send: {machine: PUSHER, command: PUSH}, until: pushed}
+      loaded:
+      clearing: {send: {machine: BELT, command: RUN}, until: cleared}
+transitions:
+  first: {from: belt.empty, to: belt.pushing, if: belt.part_there}
+  lies: {from: belt.pushing, to: belt.loaded}
+  next: {from: belt.loaded, to: belt.clearing, if: belt.part_there}
+  clear: {from: belt.clearing, to: belt.pushing}
+"""
+PUSHING = """\
+firable_plant: 1
+plant: pushed
+stations: [entry, table, exit]
+arrivals: {station: entry, every_s: 8}
+departures: {station: exit, after_s: 1}
+machines:
+  PUSHER: {commands: {PUSH: {does: carry, from: entry, to: table, takes_s: 1}}}
+  BELT: {commands: {RUN: {does: carry, from: table, to: exit, takes_s: 1, when_full: wait}}}
+sensors: {belt.part_there: {occupied: SEES}}
+"""
+
 
 def firable(*arguments: str) -> subprocess.Popen[str]:
     command = [sys.executable, "-u", "-m", "firable.cli", *arguments]
@@ -98,3 +128,21 @@ def test_a_run_that_ends_held_is_told_to_say_what_became_of_commands_only_with_a
     assert with_journal.status is without.status is Status.UNKNOWN
     assert "`--say`" in with_journal.hint
     assert without.hint == "name a --journal: then a run that is held can be taken up"
+
+
+def test_where_the_last_workpiece_waits_for_another_one_that_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    net, bundle, plant = tmp_path / "cell.firable.yaml", tmp_path / "cell.bundle", tmp_path / "cell.plant.yaml"
+    net.write_text(PUSHED, "utf-8")
+    plant.write_text(PUSHING.replace("SEES", "entry"), "utf-8")
+    assert main(["bundle", str(net), "-o", str(bundle)]) == 0
+    run = ["run", str(bundle), "--plant", str(plant), "--workpieces", "3"]
+    assert main(run) == 1
+    said = capsys.readouterr().out
+    assert "2 workpieces carried through, 0 lost, 0 doubled, 1 still inside" in said
+    assert "about: 1 of 3 workpieces stays inside until another one comes, next waits for belt.part_there" in said
+    assert "where each workpiece is pushed on by the next one, the last stay inside" in said
+    plant.write_text(PUSHING.replace("SEES", "table"), "utf-8")  # so that nothing is seen to come
+    assert main([*run[:-1], "1"]) == 1
+    assert "about: first waits for belt.part_there" in capsys.readouterr().out
