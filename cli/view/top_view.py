@@ -1,10 +1,10 @@
 """Where everything of a cell stands in its top view, from its plant file alone.
 
 The plant file has no positions, so this is a sketch, arranged as a cell is sketched on paper: the stations in the order
-of the file from left to right, a belt from the station from which a machine carries to the first one to which it does,
-a table where a machine works, set back from the line, and an arm before the stations that it reaches. Arms that reach
-the same stations stand on both sides of the line. A machine that only works, at no station that the file names, stands
-behind them all.
+of the file from left to right, a belt from the station from which a machine carries to each to which it does, the
+first of them on the line and the others behind that, a table where a machine works, set back from the line, and an arm
+before the stations that it reaches. Arms that reach the same stations stand on both sides of the line. A machine that
+only works, at no station that the file names, stands behind them all.
 
 A machine that carries from several stations is an arm whose gripper is a station of its own: what it alone fills and
 empties. Units are those of the drawing; the line is y = 0, and what is in front of it has y > 0.
@@ -29,20 +29,21 @@ def top_view(plant: PlantModel) -> dict[str, Any]:
     """The places of stations, belts, tables, arms and other machines."""
     grippers = {arm: _grippers(plant, arm) for arm in plant.machines if is_arm(plant, arm)}
     hidden = {station for stations in grippers.values() for station in stations}
-    belts = {name: pairs[0] for name in plant.machines if not is_arm(plant, name) and (pairs := carries(plant, name))}
+    belts = {name: pairs for name in plant.machines if not is_arm(plant, name) and (pairs := carries(plant, name))}
     tables = {name: at for name in plant.machines if (at := works_at(plant, name)) is not None and name not in grippers}
-    stations = _stations(plant, hidden, set(belts.values()), set(tables.values()))
+    stations = _stations(plant, hidden, list(belts.values()), set(tables.values()))
     arms = _arms(plant, grippers, stations)
     rest = [name for name in plant.machines if name not in {*belts, *tables, *arms}]
     middle = sum(x for x, _ in stations.values()) / max(1, len(stations))
     left = middle - (len(rest) - 1) * GAP / 2
-    behind = min([BACK * 2.2, *(arm["home"][1] - SIDE for arm in arms.values())])
+    backs = [*(arm["home"][1] for arm in arms.values()), *(y for _, y in stations.values())]
+    behind = min([BACK * 2.2, *(y - SIDE for y in backs)])
     others = {name: [left + i * GAP, behind] for i, name in enumerate(rest)}
     return {
         "name": plant.plant,
         "says": plant.description,
         "stations": stations,
-        "belts": {name: [*stations[a], *stations[b]] for name, (a, b) in belts.items()},
+        "belts": {name: {b: [*stations[a], *stations[b]] for a, b in pairs} for name, pairs in belts.items()},
         "tables": {name: stations[at] for name, at in tables.items()},
         "arms": arms,
         "others": others,
@@ -69,25 +70,32 @@ def _grippers(plant: PlantModel, arm: str) -> set[str]:
 
 
 def _stations(
-    plant: PlantModel, hidden: set[str], belts: set[tuple[str, str]], tables: set[str]
+    plant: PlantModel, hidden: set[str], belts: list[list[tuple[str, str]]], tables: set[str]
 ) -> dict[str, list[float]]:
-    ends = {end for pair in belts for end in pair}
+    line = {pairs[0] for pairs in belts}
+    ends = {end for pair in line for end in pair}
+    behind = {end: pairs[0][1] for pairs in belts for _, end in pairs[1:] if end not in ends}
     found: dict[str, list[float]] = {}
     x, before = 0.0, None
     for name in plant.stations:
-        if name in hidden:
+        if name in hidden or name in behind:
             continue
         if before is not None:
-            x += BELT if (before, name) in belts or (name, before) in belts else GAP
+            x += BELT if (before, name) in line or (name, before) in line else GAP
         found[name] = [x, BACK if name in tables or name not in ends else 0.0]
         before = name
+    for name, first in behind.items():
+        x, y = found[first][0], BACK
+        while [x, y] in found.values():
+            y += BACK
+        found[name] = [x, y]
     return found
 
 
 def _arms(plant: PlantModel, grippers: dict[str, set[str]], stations: dict[str, list[float]]) -> dict[str, Any]:
     """Each arm before the middle of what it reaches; where one stands there already, behind it, or beside."""
     arms: dict[str, Any] = {}
-    taken: list[tuple[float, float]] = []
+    taken = [(x, y) for x, y in stations.values() if y < BACK]
     for arm, own in grippers.items():
         one = plant.machines[arm]
         reached = [s for s in one.positions.values() if s in stations]

@@ -6,9 +6,12 @@ import re
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import pytest
+from playwright.sync_api import expect
 from support import rejecting_cell
+from support.browser import browser, command, needs_browser, page_at
 
 from firable.cli.view.runs import Run
 from firable.cli.view.scene import Piece, Stage
@@ -19,6 +22,34 @@ from firable.nets.machines.plant_file import PlantModel, parse_plant, read_plant
 from firable.nets.text import parse_net
 from firable.semantics.trace import Discipline, Trace
 
+SORTING_NET = """\
+firable: 1
+cell: sorting
+controllers:
+  belt:
+    start: idle
+    places:
+      idle:
+      carrying: {send: {machine: B, command: OUT}, until: carried}
+      rejecting: {send: {machine: B, command: REJECT}, until: rejected}
+transitions:
+  good: {from: belt.idle, to: belt.carrying}
+  end: {from: belt.carrying, to: belt.idle}
+  bad: {from: belt.idle, to: belt.rejecting}
+  over: {from: belt.rejecting, to: belt.idle}
+"""
+SORTING = """\
+firable_plant: 1
+plant: sorting
+stations: [entry, out, bin]
+arrivals: {station: entry, every_s: 4}
+departures: [{station: out}, {station: bin}]
+machines:
+  B:
+    commands:
+      OUT: {does: carry, from: entry, to: out, takes_s: 1}
+      REJECT: {does: carry, from: entry, to: bin, takes_s: 1}
+"""
 PLANTS = {
     name: path for name in catalogue_names() if (path := catalogue_path(name).with_name(f"{name}.plant.yaml")).exists()
 }
@@ -28,6 +59,12 @@ def plant(name: str) -> PlantModel:
     return read_plant(PLANTS[name])
 
 
+def assert_apart(view: dict[str, Any]) -> None:
+    bodies = [*view["stations"].values(), *view["others"].values(), *(arm["base"] for arm in view["arms"].values())]
+    for (a, b), (c, d) in combinations(bodies, 2):
+        assert max(abs(a - c), abs(b - d)) >= 60
+
+
 @pytest.mark.parametrize("name", PLANTS)
 def test_everything_of_a_cell_stands_somewhere_and_apart(name: str) -> None:
     model = plant(name)
@@ -35,9 +72,7 @@ def test_everything_of_a_cell_stands_somewhere_and_apart(name: str) -> None:
     grippers = {station for arm in view["arms"].values() for station in arm["gripper"]}
     assert {*view["stations"], *grippers} == set(model.stations)
     assert {*view["belts"], *view["tables"], *view["arms"], *view["others"]} == set(model.machines)
-    bodies = [*view["stations"].values(), *view["others"].values(), *(arm["base"] for arm in view["arms"].values())]
-    for (a, b), (c, d) in combinations(bodies, 2):
-        assert max(abs(a - c), abs(b - d)) >= 60
+    assert_apart(view)
 
 
 def test_a_workpiece_goes_through_the_cell_and_out_of_it() -> None:
@@ -82,21 +117,68 @@ def test_a_command_that_is_left_before_its_completion_has_no_effect() -> None:
     assert stage.signal(moving, "robot.at_cv1").busy == {}
 
 
-def test_a_belt_that_carries_out_or_rejects_is_a_belt() -> None:
-    text = PLANTS["one_robot"].read_text("utf-8").replace("cv2_exit]", "cv2_exit, bin]", 1)
-    run = "RUN:     {does: carry, from: cv2_entry, to: cv2_exit, "
-    assert run in text
-    view = top_view(
-        parse_plant(text.replace(run, f"REJECT: {{does: carry, from: cv2_entry, to: bin, takes_s: 1}}\n      {run}"))
-    )
+def sorting(*ends: str) -> PlantModel:
+    """The cell of one robot whose belt out carries to these."""
+    text = PLANTS["one_robot"].read_text("utf-8").replace("cv2_exit]", "cv2_exit, bin, rework]", 1)
+    run = re.compile(r"RUN: +{does: carry, from: cv2_entry, to: cv2_exit.*")
+    ways = (f"TO_{end}: {{does: carry, from: cv2_entry, to: {end}, takes_s: 1}}" for end in ends)
+    return parse_plant(run.sub("\n      ".join(ways), text))
+
+
+@pytest.mark.parametrize("ends", [("bin", "cv2_exit"), ("cv2_exit", "bin"), ("cv2_exit", "bin", "rework")])
+def test_a_belt_that_carries_out_or_rejects_is_a_belt_with_a_way_to_each(ends: tuple[str, ...]) -> None:
+    view = top_view(sorting(*ends))
     assert [*view["belts"]] == ["CV1", "CV2"]
+    assert [*view["belts"]["CV2"]] == [*ends]
     assert [*view["arms"]] == ["R"]
-    assert view["belts"]["CV2"] == [*view["stations"]["cv2_entry"], *view["stations"]["bin"]]
-    view = top_view(
-        parse_plant(text.replace(run, f"{run}takes_s: 1}}\n      REJECT: {{does: carry, from: cv2_entry, to: bin, "))
-    )
-    assert view["belts"]["CV2"] == [*view["stations"]["cv2_entry"], *view["stations"]["cv2_exit"]]
-    assert view["stations"]["bin"][1] != view["stations"]["cv2_exit"][1]
+    stations = view["stations"]
+    assert view["belts"]["CV2"] == {end: [*stations["cv2_entry"], *stations[end]] for end in ends}
+    (x, y), *behind = (stations[end] for end in ends)
+    assert y == stations["cv2_entry"][1] == 0.0
+    assert behind == [[x, -95.0], [x, -190.0]][: len(behind)]
+    assert_apart(view)
+
+
+def test_who_stands_behind_the_line_stands_behind_all_ends_of_belts_too() -> None:
+    text = """firable_plant: 1
+plant: p
+stations: [a, b, c, d]
+arrivals: {station: a, every_s: 1}
+departures: {station: b}
+machines:
+  B:
+    commands:
+      TO_B: {does: carry, from: a, to: b, takes_s: 1}
+      TO_C: {does: carry, from: a, to: c, takes_s: 1}
+      TO_D: {does: carry, from: a, to: d, takes_s: 1}
+  R1: {hand: H, positions: {H: , B: b, D: d}, commands: {GO: {does: move, takes_s: 1}}}
+  R2: {hand: H, positions: {H: , B: b, D: d}, commands: {GO: {does: move, takes_s: 1}}}
+  M: {commands: {GO: {does: work, takes_s: 1}}}
+"""
+    assert_apart(top_view(parse_plant(text)))
+
+
+@needs_browser
+def test_of_a_belt_the_way_on_which_it_carries_runs(tmp_path: Path) -> None:
+    net = tmp_path / "sorting.firable.yaml"
+    net.write_text(SORTING_NET, "utf-8")
+    net.with_name("sorting.plant.yaml").write_text(SORTING, "utf-8")
+    with (
+        browser() as chromium,
+        command("view", net, "--no-browser") as (address, _),
+        page_at(chromium, address) as page,
+    ):
+        page.get_by_role("tab", name="Top view").click()
+        page.get_by_role("switch", name="Gates free").click()
+        ways = page.locator("[data-machine=B] .running")
+        runs = page.locator("[data-machine=B] .running.on")
+        expect(ways).to_have_count(2)
+        expect(runs).to_have_count(0)
+        for transition, end in (("good", "out"), ("end", None), ("bad", "bin")):
+            page.locator(f"[data-transition={transition}]").click()
+            expect(runs).to_have_count(0 if end is None else 1)
+            if end is not None:
+                expect(runs).to_have_attribute("data-to", end)
 
 
 def test_a_sensor_shows_that_a_workpiece_has_come_and_only_one() -> None:

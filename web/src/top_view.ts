@@ -4,6 +4,7 @@
 import { calm, h, svg } from "./dom";
 
 type Spot = [number, number];
+type Way = [number, number, number, number];
 
 export interface Scene {
   pieces: [number, string, boolean][];
@@ -29,7 +30,8 @@ interface View {
   name: string;
   says: string;
   stations: Record<string, Spot>;
-  belts: Record<string, [number, number, number, number]>;
+  /** Of each the ways on which it carries, from one station, by the stations to which they lead. */
+  belts: Record<string, Record<string, Way>>;
   tables: Record<string, Spot>;
   arms: Record<string, Arm>;
   others: Record<string, Spot>;
@@ -58,6 +60,12 @@ function shortened(words: string, longest: number): string {
 
 function polar([x, y]: Spot, at: Spot): { turn: number; length: number } {
   return { turn: (Math.atan2(at[1] - y, at[0] - x) * 180) / Math.PI, length: Math.hypot(at[0] - x, at[1] - y) };
+}
+
+/** The middle of a belt, which is that of the first of its ways: it stands on the line. */
+function middle(ways: Record<string, Way>): Spot {
+  const [x1, y1, x2, y2] = Object.values(ways)[0]!;
+  return [(x1 + x2) / 2, (y1 + y2) / 2];
 }
 
 export class TopView {
@@ -110,13 +118,17 @@ export class TopView {
     const ys = spots.map(([, y]) => y);
     const [left, top] = [Math.min(...xs) - MARGIN, Math.min(...ys) - MARGIN];
     this.drawing.setAttribute("viewBox", `${left} ${top} ${Math.max(...xs) + MARGIN - left} ${Math.max(...ys) + MARGIN - top}`);
-    for (const [name, [x1, y1, x2, y2]] of Object.entries(view.belts)) {
+    for (const [name, ways] of Object.entries(view.belts)) {
       const belt = this.group(name, "belt");
-      const length = Math.hypot(x2 - x1, y2 - y1) + WIDTH + 12;
-      const turn = `translate(${(x1 + x2) / 2} ${(y1 + y2) / 2}) rotate(${(Math.atan2(y2 - y1, x2 - x1) * 180) / Math.PI})`;
-      const inner = svg("g", { transform: turn });
-      inner.append(svg("rect", { x: -length / 2, y: -WIDTH / 2 - 5, width: length, height: WIDTH + 10, rx: 8, class: "body" }), svg("path", { d: `M${-length / 2 + 6} 0H${length / 2 - 6}`, class: "running" }));
-      belt.append(inner, this.label((x1 + x2) / 2, (y1 + y2) / 2 + WIDTH / 2 + 22, name, "name", BELT_LONGEST), this.label((x1 + x2) / 2, (y1 + y2) / 2 + WIDTH / 2 + 37, "", "doing"));
+      const [bodies, running] = [svg("g"), svg("g")]; // so that no body lies on another's way
+      for (const [to, [x1, y1, x2, y2]] of Object.entries(ways).reverse()) { // that on the line above those that branch off
+        const length = Math.hypot(x2 - x1, y2 - y1) + WIDTH + 12;
+        const transform = `translate(${(x1 + x2) / 2} ${(y1 + y2) / 2}) rotate(${(Math.atan2(y2 - y1, x2 - x1) * 180) / Math.PI})`;
+        bodies.append(svg("rect", { x: -length / 2, y: -WIDTH / 2 - 5, width: length, height: WIDTH + 10, rx: 8, class: "body", transform }));
+        running.append(svg("path", { d: `M${-length / 2 + 6} 0H${length / 2 - 6}`, class: "running", "data-to": to, transform }));
+      }
+      const [x, y] = middle(ways);
+      belt.append(bodies, running, this.label(x, y + WIDTH / 2 + 22, name, "name", BELT_LONGEST), this.label(x, y + WIDTH / 2 + 37, "", "doing"));
     }
     for (const [name, [x, y]] of Object.entries(view.tables)) {
       const table = this.group(name, "table");
@@ -166,6 +178,7 @@ export class TopView {
     for (const [name, group] of this.machines) {
       const doing = top.doing[name];
       group.classList.toggle("busy", doing !== undefined);
+      for (const way of group.querySelectorAll<SVGPathElement>(".running")) way.classList.toggle("on", way.dataset["to"] === doing?.to);
       group.querySelector(".doing")!.textContent = doing === undefined ? "" : shortened(doing.command.slice(name.length + 1), SPOT_LONGEST);
     }
     for (const name of this.hands.keys()) this.reach(view.arms[name]!, name, this.handAt(view, top, name), lasting(name));
@@ -234,9 +247,9 @@ export class TopView {
   private spot(view: View, top: Top, on: string): Spot {
     const arm = this.holder(view, on);
     if (arm !== undefined) return this.handAt(view, top, arm);
-    const belt = view.belts[on];
-    if (belt === undefined) return view.stations[on] ?? [0, 0];
-    return view.stations[top.doing[on]?.to ?? ""] ?? [(belt[0] + belt[2]) / 2, (belt[1] + belt[3]) / 2];
+    const ways = view.belts[on];
+    if (ways === undefined) return view.stations[on] ?? [0, 0];
+    return view.stations[top.doing[on]?.to ?? ""] ?? middle(ways);
   }
 
   private reach({ base }: Arm, name: string, at: Spot, seconds: number): void {
