@@ -24,6 +24,7 @@ from firable.analysis.goal import Limits
 from firable.analysis.loop.families import Answered, Family
 from firable.analysis.loop.faults import ask_faults
 from firable.analysis.loop.verdicts import LIVE, ask_loop, without
+from firable.analysis.spaces.reachability import Budget
 from firable.decompose.proofs.held_gates import EVIDENCE, held_gates
 from firable.decompose.verification.happenings import Plant
 from firable.decompose.verification.plant import UncomparedError
@@ -48,9 +49,10 @@ def sealed_loops(
 ) -> tuple[tuple[Verdict, ...], dict[str, str], dict[str, str]]:
     """The verdicts on a net with the machines of a plant file, given as its text, and the files that they name.
 
-    `limits` are those of each document. A verdict of which a part is not shown names no evidence, and the third that is
-    returned tells by its name why. One Ctrl-C ends the questions to all loops. Raises `InputError` as `close` does, and
-    as `check` does, and F4003 where a loop could not be held against the plant file again.
+    `limits` are those of each document, and of what is asked for information alone. A verdict of which a part is not
+    shown names no evidence, and the third that is returned tells by its name why. One Ctrl-C ends the questions to all
+    loops. Raises `InputError` as `close` does, and as `check` does, and F4003 where a loop could not be held against
+    the plant file again.
     """
     net, model = decomposition.net, parse_plant(plant)
     _see_compared(net, model)
@@ -60,7 +62,9 @@ def sealed_loops(
     loop = ask_loop(net, model, interrupted=interrupted)
     lost = sealing.add(LOOP, loop, loop.verdicts)[LIVE]
     # A fault takes nothing of what is not live without it: but only of what is shown not to be.
-    faults = ask_faults(loop, model, live=without(loop, lost), interrupted=interrupted)
+    # And what comes to stand still then is for information: what takes longer to find than evidence may, has none.
+    within = Budget(seconds=limits().deadline.left_seconds)
+    faults = ask_faults(loop, model, within, without(loop, lost), interrupted=interrupted)
     if faults.for_good is not None:
         sealing.add(FAILING, faults.for_good, faults.for_good.verdicts)
     if faults.following is not None:

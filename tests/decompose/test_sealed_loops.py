@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from typing import Any
 
 import pytest
 from support.bench_cell import PLANT as BENCH
 from support.bench_cell import STARTS
 
+from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.document import Document, Record, document_from_text
 from firable.analysis.goal import Limits
-from firable.analysis.loop.families import Answered
+from firable.analysis.loop.families import Answered, Family, answers
+from firable.analysis.spaces.reachability import Budget
 from firable.decompose.proofs.closed_loops import FAILING, UNDECIDED, sealed_loops
 from firable.decompose.splitting.cut import split
+from firable.nets.machines.loop import ClosedLoop
 from firable.nets.text import parse_net
 from firable.nets.verdict import Status
 
@@ -27,6 +31,19 @@ def left_out(records: Iterable[Record]) -> Iterator[Record]:
 def without_evidence(records: Iterable[Record]) -> Iterator[Record]:
     for record in records:
         yield Record(LOST, False, (), "the time was over") if record.name == LOST else record
+
+
+def test_what_stands_still_after_a_fault_is_looked_for_in_the_time_of_evidence(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[Budget | None] = []
+
+    def ask(loop: ClosedLoop, families: Iterable[Family], budget: Budget | None = None, **by: Any) -> Answered:
+        given.append(budget)
+        return answers(loop, families, budget, **by)
+
+    for module in ("faults", "verdicts"):
+        monkeypatch.setattr(f"firable.analysis.loop.{module}.answers", ask)
+    sealed_loops(split(parse_net(STARTS)), BENCH, lambda: Limits(Deadline.after(0)))
+    assert given == [None, Budget(seconds=0.0)], "of the loop without faults, and of that with them"
 
 
 WITH_LIVE = ("loop.live", "fault.R.repaired")
