@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
+
+import pytest
 
 from firable.decompose.proofs.proving import prove
 from firable.decompose.splitting.cut import split
 from firable.nets.decomposition import Decomposition, Part
-from firable.nets.net import Arbiter, Controller, Net, Place, Transition
+from firable.nets.net import Arbiter, Controller, ExternalGate, Net, Place, Signal, Transition
 
 NET = Net(
     "light",
@@ -61,6 +64,11 @@ def test_subnet_with_an_arbiter_of_its_own_is_refuted() -> None:
     assert refuted(with_b(replace(b, arbiters=(Arbiter("own", ("t2-12", "tire")),)))) == {"ownership"}
 
 
+def test_subnet_that_calls_its_controller_a_coordinator_is_refuted() -> None:
+    b = split(NET).subnet("b")
+    assert refuted(with_b(replace(b, controllers=(Controller("b", coordinator=True),)))) == {"ownership"}
+
+
 def test_row_that_is_missing_is_refuted_of_its_transition_and_where_that_competes() -> None:
     whole = split(NET)
     assert [row.name for row in whole.coordinated] == ["up", "down", "dim"]
@@ -74,3 +82,70 @@ def test_row_that_is_missing_is_refuted_of_its_transition_and_where_that_compete
 def test_part_that_nobody_has_is_refuted_of_what_it_takes_part_in() -> None:
     found = refuted(with_row("up", (Part("a", "t1-11"), Part("b", "t2-12"), Part("b", "nothing"))))
     assert {"eq7.up", "eq8.up", "o3.up"} <= found
+
+
+REPEATING = Net(
+    "press",
+    (
+        Place("a.p", "a", marked=True),
+        *(Place(f"b.{name}", "b", marked=name in {"in", "ok"}) for name in ("in", "out", "ok", "no")),
+    ),
+    (Transition("G", ("a.p", "b.in"), ("b.out",), ("b.ok", "b.in"), ("b.no", "b.out"), (ExternalGate("b.s"),)),),
+    (Signal("b.s", "b"),),
+    (Controller("a"), Controller("b")),
+)
+"""Two of the gates of its transition say what its arcs say anyway."""
+
+
+@pytest.mark.parametrize(
+    ("kind", "lacking", "families"),
+    [
+        ("inputs", "b.in", {"eq9-10", "o3"}),  # which a gate still reads
+        ("outputs", "b.out", {"eq9-10", "o3"}),
+        ("permissive", "b.ok", {"eq7", "o3"}),
+        ("permissive", "b.in", {"o3"}),
+        ("inhibitive", "b.no", {"eq7", "o3"}),
+        ("inhibitive", "b.out", {"o3"}),
+        ("external", ExternalGate("b.s"), {"eq8", "o3"}),
+    ],
+)
+def test_arc_or_gate_that_a_part_lacks_is_refuted_of_what_it_reads(
+    kind: str, lacking: object, families: set[str]
+) -> None:
+    whole = split(REPEATING)
+    (part,) = whole.subnet("b").transitions
+    left: dict[str, Any] = {kind: tuple(one for one in getattr(part, kind) if one != lacking)}
+    b = replace(whole.subnet("b"), transitions=(replace(part, **left),))
+    found = refuted(replace(whole, subnets=(whole.subnet("a"), b)))
+    assert {name.partition(".")[0] for name in found} == families
+
+
+@pytest.mark.parametrize("kind", ["permissive", "inhibitive", "external"])
+def test_gate_that_a_part_reads_from_a_copy_is_refuted_of_what_it_reads(kind: str) -> None:
+    """A copy is as old as its last message."""
+    whole = split(REPEATING)
+    a, b = whole.subnets
+    (here,), (there,) = a.transitions, b.transitions
+    read = getattr(there, kind)[0]
+    kept: dict[str, Any] = {kind: getattr(there, kind)[1:]}
+    moved: dict[str, Any] = {kind: (read,)}
+    copies = tuple(replace(place, owner=None) for place in b.places if place.name == read)
+    signals = tuple(replace(signal, owner=None) for signal in b.signals if kind == "external")
+    a = replace(a, transitions=(replace(here, **moved),), places=(*a.places, *copies), signals=signals)
+    found = refuted(replace(whole, subnets=(a, replace(b, transitions=(replace(there, **kept),)))))
+    assert {"o3.G", "ownership"} <= found
+
+
+def test_what_nobody_owns_is_not_what_a_controller_of_the_name_none_owns() -> None:
+    whole = split(
+        Net(
+            "none",
+            (Place("None.p", "None", marked=True),),
+            (Transition("t", ("None.p",), external=(ExternalGate("None.s"),)),),
+            (Signal("None.s", "None"),),
+            (Controller("None"),),
+        )
+    )
+    assert refuted(whole) == set()
+    nobodys = replace(whole.net, signals=(Signal("None.s"),))
+    assert {"o3.t", "ownership"} <= refuted(replace(whole, net=nobodys))
