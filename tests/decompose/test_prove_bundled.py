@@ -95,6 +95,26 @@ def test_protocol_proof_says_of_a_split_what_it_says_where_all_that_it_assumes_i
     assert protocol_lines(decomposition, [v for v in broken if v is not owned]) == [("violated", doubted)] * 2
 
 
+def test_each_obligation_is_violated_where_a_family_that_serves_it_has_a_verdict_that_is() -> None:
+    decomposition = split(catalogue_net("conceptual_one_robot"))
+    verdicts = prove(decomposition).verdicts
+    serves = {
+        "o2": {"O2"},
+        "arbitration": {"O2"},
+        "o3": {"O3"},
+        "ownership": {"O3"},
+        "o8": {"O8"},
+        "o8-apart": {"O8"},
+        "protocol": {"O1", "O5"},
+    }
+    assert serves.keys() < {family.name for family in FAMILIES}
+    for family in FAMILIES:
+        for name in (family.name, f"{family.name}.t"):
+            told = (*verdicts, Verdict(name, Status.VIOLATED, "it is so", "z3"))
+            violated = {one.name for one in standing(decomposition, told) if one.status == "violated"}
+            assert violated == serves.get(family.name, set()), name
+
+
 @pytest.mark.parametrize(
     ("of_one", "says"),
     [(Status.PROVED, "shown in the loop"), (Status.UNKNOWN, "unknown"), (Status.VIOLATED, "violated")],
