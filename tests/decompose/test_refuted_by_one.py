@@ -10,7 +10,18 @@ import pytest
 from firable.decompose.proofs.proving import prove
 from firable.decompose.splitting.cut import split
 from firable.nets.decomposition import Decomposition, Part
-from firable.nets.net import Arbiter, Controller, ExternalGate, Net, Place, Signal, Transition
+from firable.nets.net import (
+    Arbiter,
+    Command,
+    Controller,
+    ExternalGate,
+    Net,
+    Place,
+    Signal,
+    SignalKind,
+    TimeLimit,
+    Transition,
+)
 
 NET = Net(
     "light",
@@ -67,6 +78,12 @@ def test_subnet_with_an_arbiter_of_its_own_is_refuted() -> None:
 def test_subnet_that_calls_its_controller_a_coordinator_is_refuted() -> None:
     b = split(NET).subnet("b")
     assert refuted(with_b(replace(b, controllers=(Controller("b", coordinator=True),)))) == {"ownership"}
+
+
+def test_transition_that_no_subnet_has_is_refuted_though_nothing_can_hold_it_back() -> None:
+    whole = split(NET)
+    idle = replace(NET, transitions=(*NET.transitions, Transition("idle")))
+    assert refuted(replace(whole, net=idle)) == {"eq7.idle", "eq8.idle"}
 
 
 def test_row_that_is_missing_is_refuted_of_its_transition_and_where_that_competes() -> None:
@@ -149,3 +166,58 @@ def test_what_nobody_owns_is_not_what_a_controller_of_the_name_none_owns() -> No
     assert refuted(whole) == set()
     nobodys = replace(whole.net, signals=(Signal("None.s"),))
     assert {"o3.t", "ownership"} <= refuted(replace(whole, net=nobodys))
+
+
+SENDING = Net(
+    "mill",
+    (
+        Place("a.idle", "a", marked=True),
+        Place("a.show", "a", command=Command("LAMP", "ON")),
+        Place("a.run", "a", command=Command("M", "RUN", (("n", "1"),)), completion="a.done"),
+        Place("a.turn", "a", command=Command("M", "TURN"), completion="a.turned", within=TimeLimit(5, "a.late")),
+    ),
+    (
+        Transition("start", ("a.idle",), ("a.show",), external=(ExternalGate("a.door"),)),
+        Transition("run", ("a.show",), ("a.run",)),
+        Transition("turn", ("a.run",), ("a.turn",), external=(ExternalGate("a.done"),)),
+        Transition("end", ("a.turn",), ("a.idle",), external=(ExternalGate("a.turned"),)),
+        Transition(
+            "late", ("a.turn",), ("a.idle",), external=(ExternalGate("a.turned", wanted=False), ExternalGate("a.late"))
+        ),
+    ),
+    (
+        Signal("a.door", "a"),
+        *(Signal(f"a.{name}", "a", SignalKind.COMPLETION) for name in ("done", "turned")),
+        Signal("a.late", "a", SignalKind.TIMER),
+    ),
+    (Controller("a"),),
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "edit"),
+    [
+        ("a.show", {"command": None}),
+        ("a.idle", {"command": Command("LAMP", "OFF")}),
+        ("a.run", {"command": Command("OTHER", "RUN", (("n", "1"),))}),
+        ("a.run", {"command": Command("M", "OTHER", (("n", "1"),))}),
+        ("a.run", {"command": Command("M", "RUN", (("n", "2"),))}),
+        ("a.run", {"completion": None}),
+        ("a.turn", {"within": TimeLimit(6, "a.late")}),
+    ],
+)
+def test_command_that_a_subnet_sends_or_ends_otherwise_is_refuted_of_commands(name: str, edit: dict[str, Any]) -> None:
+    whole = split(SENDING)
+    assert refuted(whole) == set()
+    (a,) = whole.subnets
+    changed = replace(a, places=tuple(replace(p, **edit) if p.name == name else p for p in a.places))
+    assert refuted(replace(whole, subnets=(changed,))) == {"commands"}
+
+
+def test_signal_that_is_a_completion_in_its_subnet_alone_is_refuted_of_commands() -> None:
+    """It would be cleared by a command, and the sensor by nobody."""
+    whole = split(SENDING)
+    (a,) = whole.subnets
+    door, *others = a.signals
+    changed = replace(a, signals=(replace(door, kind=SignalKind.COMPLETION), *others))
+    assert refuted(replace(whole, subnets=(changed,))) == {"commands"}
