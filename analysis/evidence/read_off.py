@@ -66,7 +66,8 @@ def _races_have_an_order(net: Net, deadline: Deadline) -> bool:
 def eager_cycle(net: Net, deadline: Deadline = NEVER) -> frozenset[str] | None:
     """What fires for ever in the arbitrated run with all gates open; None where there is none, or it takes too long.
 
-    In it no time is ever over, so what fires only after one is counted with those that need not fire.
+    In it no time is ever over, so what fires only after one is counted with those that need not fire. A run that ends
+    stays where it ends, and there nothing fires for ever.
 
     Raises `InputError` F2013 where the arbiters do not fit the conflicts, and `TimeIsOverError`.
     """
@@ -79,8 +80,6 @@ def eager_cycle(net: Net, deadline: Deadline = NEVER) -> frozenset[str] | None:
     may_fire = _MayFire(net, able)
     for _ in in_time(range(STEPS_MAX), deadline):
         enabled = may_fire.at(marking)
-        if not enabled:
-            return _never_called(net, timers)
         if not jointly_openable(net, enabled):
             return None
         step, turns = arbitration.decide(enabled, turns)
