@@ -96,6 +96,16 @@ def test_row_that_is_missing_is_refuted_of_its_transition_and_where_that_compete
     assert found["dim"] == {"o2.a.on", "arbitration"}
 
 
+def test_row_is_demanded_of_a_transition_in_which_another_takes_part_by_a_signal_alone() -> None:
+    ends = (Place("a.p", "a", marked=True), Place("a.q", "a"))
+    reads = Transition("read", ("a.p",), ("a.q",), external=(ExternalGate("b.s"),))
+    whole = split(Net("watch", ends, (reads,), (Signal("b.s", "b"),), (Controller("a"), Controller("b"))))
+    assert refuted(whole) == set()
+    (row,) = whole.coordinated
+    assert "o2.read" in refuted(replace(whole, coordinated=()))
+    assert refuted(replace(whole, coordinated=(replace(row, parts=row.parts[:1]),))) >= {"eq8.read", "o3.read"}
+
+
 def test_part_that_nobody_has_is_refuted_of_what_it_takes_part_in() -> None:
     found = refuted(with_row("up", (Part("a", "t1-11"), Part("b", "t2-12"), Part("b", "nothing"))))
     assert {"eq7.up", "eq8.up", "o3.up"} <= found
