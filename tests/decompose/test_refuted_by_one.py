@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -9,7 +10,7 @@ import pytest
 
 from firable.decompose.proofs.proving import prove
 from firable.decompose.splitting.cut import split
-from firable.nets.decomposition import Decomposition, Part
+from firable.nets.decomposition import ArbitrationGroup, Decomposition, Part
 from firable.nets.net import (
     Arbiter,
     Command,
@@ -94,6 +95,26 @@ def test_row_that_is_missing_is_refuted_of_its_transition_and_where_that_compete
     assert {name for name in found["up"] if name.startswith("o2.")} == {"o2.up"}
     assert {name for name in found["down"] if name.startswith("o2.")} == {"o2.down", "o2.a.on"}
     assert found["dim"] == {"o2.a.on", "arbitration"}
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda _: (),
+        lambda group: (group, replace(group, name="again")),
+        lambda group: (replace(group, controller="a"),),
+        lambda group: (replace(group, sequence=group.sequence[1:], rest=group.rest[1:]),),
+        lambda group: (replace(group, sequence=group.sequence[:-1], rest=group.rest[:-1]),),
+    ],
+    ids=["by no group", "by two", "by a controller, though one has a row", "not the first", "not the last"],
+)
+def test_group_that_does_not_decide_for_all_that_compete_is_refuted_where_they_do(
+    edit: Callable[[ArbitrationGroup], tuple[ArbitrationGroup, ...]],
+) -> None:
+    whole = split(NET)
+    (group,) = whole.groups
+    found = refuted(replace(whole, groups=edit(group)))
+    assert {name for name in found if name.startswith("o2.")} == {"o2.a.on"}
 
 
 def test_row_is_demanded_of_a_transition_in_which_another_takes_part_by_a_signal_alone() -> None:
