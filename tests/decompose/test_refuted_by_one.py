@@ -13,6 +13,7 @@ from firable.decompose.splitting.cut import split
 from firable.nets.decomposition import ArbitrationGroup, Decomposition, Part
 from firable.nets.net import (
     Arbiter,
+    ArbitrationRule,
     Command,
     Controller,
     ExternalGate,
@@ -252,3 +253,48 @@ def test_signal_that_is_a_completion_in_its_subnet_alone_is_refuted_of_commands(
     door, *others = a.signals
     changed = replace(a, signals=(replace(door, kind=SignalKind.COMPLETION), *others))
     assert refuted(replace(whole, subnets=(changed,))) == {"commands"}
+
+
+def jobs(*transitions: Transition) -> Net:
+    """Of four jobs two take turns, and the others come after them."""
+    free = tuple(Place(f"a.{name}", "a", marked=True) for name in ("free", "one", "two", "three", "four"))
+    return Net(
+        "jobs",
+        (*free, Place("a.done", "a")),
+        transitions,
+        controllers=(Controller("a"), Controller("b")),
+        arbiters=(Arbiter("next", ("one", "two"), ArbitrationRule.ORDER),),
+    )
+
+
+TAKING = jobs(*(Transition(name, ("a.free", f"a.{name}")) for name in ("one", "two", "three", "four")))
+FILLING = jobs(*(Transition(name, (f"a.{name}",), ("a.done",)) for name in ("one", "two", "three", "four")))
+
+
+@pytest.mark.parametrize("net", [TAKING, FILLING], ids=["for an input", "for an output"])
+def test_group_that_decides_in_another_order_is_refuted_of_what_it_lists_and_of_what_it_grants(net: Net) -> None:
+    whole = split(net)
+    (group,) = whole.groups
+    assert refuted(whole) == set()
+    for edited in (
+        replace(group, sequence=group.sequence[::-1]),
+        replace(group, rest=group.rest[::-1]),
+        replace(group, by=ArbitrationRule.PRIORITY),
+    ):
+        assert refuted(replace(whole, groups=(edited,))) == {"arbitration", f"arbitration.{group.name}"}
+
+
+def test_group_that_another_controller_would_decide_is_refuted_of_what_it_lists() -> None:
+    whole = split(TAKING)
+    assert [group.controller for group in whole.groups] == ["a"]
+    elsewhere = tuple(replace(group, controller="b") for group in whole.groups)
+    assert refuted(replace(whole, groups=elsewhere)) == {"arbitration"}
+
+
+def test_who_wins_is_refuted_where_subnets_meet_at_an_output_instead_of_an_input() -> None:
+    """What is granted is the same, and a rotation would never turn."""
+    whole = split(TAKING)
+    a, b = whole.subnets
+    filling = tuple(replace(t, inputs=t.inputs[1:], outputs=t.inputs[:1]) for t in a.transitions)
+    found = refuted(replace(whole, subnets=(replace(a, transitions=filling), b)))
+    assert f"arbitration.{whole.groups[0].name}" in found
