@@ -36,7 +36,7 @@ from firable.analysis.spaces.reachability import explore
 from firable.analysis.temporal.queries import answer
 from firable.analysis.verdicts.goals import goals_of
 from firable.nets.diagnostics import InputError
-from firable.nets.formula import And, Constant, Firable, Formula, Holds, Not, Or
+from firable.nets.formula import And, Constant, Firable, Formula, Holds, Not, Or, Start
 from firable.nets.net import ExternalGate, Fairness, Net, Place, Property, PropertyKind, Signal, Transition
 from firable.nets.queries import Query, QueryKind
 from firable.nets.temporal import Temporal, parse_temporal
@@ -222,9 +222,19 @@ def test_the_checker_and_the_techniques_mean_the_same_by_a_verdict(net: Net) -> 
 @examples(20)
 def test_a_formula_means_the_same_of_a_net_that_starts_elsewhere(net: Net, marking: int) -> None:
     assert marking_of(net, tidy(is_marking(net, marking))) == marking
-    assert without_start(net, is_marking(net, net.initial_marking)) == And(
-        tuple(Holds(p.name) if p.marked else Not(Holds(p.name)) for p in net.places)
-    )
+    spelled = And(tuple(Holds(p.name) if p.marked else Not(Holds(p.name)) for p in net.places))
+    assert without_start(net, is_marking(net, net.initial_marking)) == spelled
+    one = Holds(net.places[0].name)
+    assert without_start(net, And((one, Or((one, Not(Start())))))) == And((one, Or((one, Not(spelled)))))
+
+
+@given(net=dense_nets())
+@examples(20)
+def test_a_formula_that_leaves_a_place_open_is_no_marking(net: Net) -> None:
+    one, other, *_ = (Holds(p.name) for p in net.places)
+    rest = tuple(Not(Holds(p.name)) for p in net.places[2:])
+    for open_ in ((one, one), (one, Or((one, other))), (one, Not(one)), (one,), (one, other, other)):
+        assert marking_of(net, And((*open_, *rest))) is None
 
 
 def test_the_home_marking_of_a_net_of_one_place_is_shown() -> None:
