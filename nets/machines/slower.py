@@ -39,8 +39,8 @@ def difference(well: Net, failing: ClosedLoop, *, repaired: bool) -> str:
     "'plant.CV1.failed' is not emptied by a repair"
     """
     failed = frozenset(failing.failed.values())
-    places = {place.name: place.marked for place in failing.net.places}
-    if places != {place.name: place.marked for place in well.places} | dict.fromkeys(failed, False):
+    places, more = ({place.name: place.marked for place in net.places} for net in (well, failing.net))
+    if not failed.isdisjoint(places) or more != places | dict.fromkeys(failed, False):
         return "its places are others, or marked otherwise"
     if well.signals or failing.net.signals:
         return "it waits for signals"

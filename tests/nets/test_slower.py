@@ -158,6 +158,17 @@ def test_every_change_of_a_loop_by_which_it_does_more_is_seen() -> None:
     }
 
 
+def test_no_place_of_the_net_without_faults_says_that_a_machine_has_failed() -> None:
+    """Such a place could be filled by failing, and what waits for it would happen only then."""
+    well = Net("well", (Place("empty"), Place("full")), (Transition("t", ("empty",), ("full",)),))
+    fails, repaired = Transition("fails", outputs=("empty",)), Transition("repaired", ("empty",))
+    _, _, loop = closed("one_robot", Sending.AT_ONCE)
+    net = replace(well, transitions=(*well.transitions, fails, repaired))
+    failing = replace(loop, net=net, failed=MappingProxyType({"A": "empty"}))
+    assert explore(net).n_markings > explore(well).n_markings
+    assert difference(well, failing, repaired=True) == "its places are others, or marked otherwise"
+
+
 def test_a_repair_that_waits_for_something_is_none() -> None:
     _, _, well = closed("one_robot", Sending.AT_ONCE)
     for faults, said in ((Faults.REPAIRED, ""), (Faults.FOR_GOOD, "'plant.CV1.failed' is not emptied by a repair")):
