@@ -92,26 +92,24 @@ class Asked:
         )
         yield from (self.of_the_file(prop) for prop in self.cell.properties if not self.unclear(prop))
 
-    def of_slower_machines(
-        self, failing: Iterable[str], repaired: Iterable[str], live: Iterable[str]
-    ) -> Iterator[Question]:
-        """What comes of machines that fail, and are repaired, down to what is asked of those that do not fail.
-
-        They are machines that take longer (`firable.nets.machines.slower`); `live` fire again and again without.
-        """
+    def of_any_fault(self) -> Question:
+        """That a fault is safe, as no accident can happen anyway (`firable.nets.machines.slower`)."""
         asked = {question.name: question.of for question in self.of_the_loop()}
-        if tuple(failing):
-            yield Question(
-                "fault.safe",
-                "no accident follows when a machine fails and is not repaired",
-                {name: asked[name][""] for name in ("loop.busy-machines", "loop.accidents")},
-            )
-        live = tuple(live)
-        for machine in repaired if live else ():
+        return Question(
+            "fault.safe",
+            "no accident follows when a machine fails and is not repaired",
+            {name: asked[name][""] for name in ("loop.busy-machines", "loop.accidents")},
+        )
+
+    def of_repairs(self, repaired: Iterable[str], live: Iterable[str]) -> Iterator[Question]:
+        """What is asked of each machine that is repaired, which is one that takes longer; `live` fire again without."""
+        asked = {question.name: question.of for question in self.of_the_loop()}
+        of = {name: asked["loop.live"][name] for name in live}
+        for machine in repaired:
             yield Question(
                 f"fault.{as_name(machine)}.repaired",
                 f"after {machine} was repaired and goes on, all that is live without faults can fire again",
-                {name: asked["loop.live"][name] for name in live},
+                of,
             )
 
     def of_faults(self, live: Iterable[str]) -> Iterator[Question]:

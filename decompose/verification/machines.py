@@ -74,21 +74,23 @@ def check_machines(examination: Examination, cut: Cut, answers: Answers, timeout
     late, well = (judging.closed(sending, Faults.NONE) for sending in (Sending.LATE, Sending.AT_ONCE))
     judging.judge(O4, late, _asked(cut, late.loop))
     shown, against = judging.judge(LOOP, well, well.asked.of_the_loop())
-    lost = against["loop.live"]
-    # A fault takes nothing of what is not live without it. What the document has no evidence on may be live, and what
-    # it has evidence on that could not be checked in time leaves the verdicts on faults without their premise.
-    live = [t.name for t in cut.net.transitions if t.name not in lost]
-    judging = replace(judging, premise="" if all(lost.values()) else "it rests on 'loop.live', which is not shown")
     if not Plant(cut.net, model, faults=Faults.FOR_GOOD).may_fail:
         return
     failing, repaired = (judging.closed(Sending.AT_ONCE, faults) for faults in (Faults.FOR_GOOD, Faults.REPAIRED))
     for one in (failing, repaired):
         if told := difference(well.loop.net, one.loop, repaired=one is repaired):
             raise NotShownError(f"a machine that fails is not one that takes longer: {told}", "evidence", PLANT)
-    for question in well.asked.of_slower_machines(failing.plant.may_fail, repaired.plant.may_fail, live):
+    judging.judge_one(well.asked.of_any_fault(), LOOP, shown)
+    lost = against["loop.live"]
+    # A fault takes nothing of what is not live without it. What the document has no evidence on may be live, and what
+    # it has evidence on that could not be checked in time leaves the verdicts on faults without their premise.
+    live = [t.name for t in cut.net.transitions if t.name not in lost]
+    if not live:
+        return
+    judging = replace(judging, premise="" if all(lost.values()) else "it rests on 'loop.live', which is not shown")
+    for question in well.asked.of_repairs(repaired.plant.may_fail, live):
         judging.judge_one(question, LOOP, shown)
-    if live:
-        judging.judge(FAILING, failing, failing.asked.of_faults(live))
+    judging.judge(FAILING, failing, failing.asked.of_faults(live))
 
 
 def _closes_nothing(error: InputError) -> NotShownError:
