@@ -459,24 +459,6 @@ def test_an_accident_before_anything_may_fail_is_none_of_a_fault() -> None:
     assert "plant.R.failed" in safe.witness.marking
 
 
-@pytest.mark.parametrize("cell", SIZES)
-def test_a_machine_that_fails_does_nothing_that_one_which_takes_longer_does_not(cell: str) -> None:
-    """So an accident after a fault can happen without one, and what is live without faults fires after a repair."""
-    net, plant = catalogue_net(cell), catalogue_plant(cell)
-    well = {t.name: t for t in close(net, plant).net.transitions}
-    for faults in (Faults.FOR_GOOD, Faults.REPAIRED):
-        loop = close(net, plant, faults)
-        failed = set(loop.failed.values())
-        left = dict(well)
-        for t in loop.net.transitions:
-            if "/fails/" in t.name or t.name.endswith("/repaired"):
-                assert {*t.inputs, *t.outputs} <= failed
-                continue
-            assert failed.isdisjoint({*t.inputs, *t.outputs, *t.permissive})
-            assert replace(t, inhibitive=tuple(one for one in t.inhibitive if one not in failed)) == left.pop(t.name)
-        assert not left
-
-
 def test_a_plant_in_which_nothing_may_fail_has_no_verdicts_on_faults() -> None:
     assert not faults_of(catalogue_net("one_robot"), plant_with(", may_fail: repairable", ""))
 

@@ -23,7 +23,10 @@ from firable.nets.machines.plant_file import PlantModel
 from firable.nets.machines.slower import difference
 from firable.nets.net import Net, Place, Signal, SignalKind, Transition
 
-CELLS = ("one_robot", "one_robot_mc_late", "one_robot_timed", "two_robots_shared", "two_robots_separate", "two_cells")
+CELLS = (
+    *("one_robot", "one_robot_mc_late", "one_robot_mc_late_capacity", "one_robot_timed"),
+    *("two_robots_shared", "two_robots_separate", "two_cells"),
+)
 FAULTS = (Faults.FOR_GOOD, Faults.REPAIRED)
 
 
