@@ -18,6 +18,8 @@ Then from each marking of F without an accident, once all is repaired, F goes on
 that (2) could inhibit. So where something can come to happen in W from each marking that it reaches, it can in F.
 
 All four are seen of the nets themselves (`difference`), whatever they were made from.
+
+Rejected: exploring the loops in which machines fail, which have several times the markings and answer the same.
 """
 
 from __future__ import annotations
