@@ -73,7 +73,7 @@ def check_machines(examination: Examination, cut: Cut, answers: Answers, timeout
     judging = _Judging(examination, cut, model, f"{METHOD} {sha256(text.encode()).hexdigest()}", answers, timeout_ms)
     late, well = (judging.closed(sending, Faults.NONE) for sending in (Sending.LATE, Sending.AT_ONCE))
     judging.judge(O4, late, _asked(cut, late.loop))
-    shown, against = judging.judge(LOOP, well, well.asked.of_the_loop())
+    shown, lost = judging.judge(LOOP, well, well.asked.of_the_loop())
     if not Plant(cut.net, model, faults=Faults.FOR_GOOD).may_fail:
         return
     failing, repaired = (judging.closed(Sending.AT_ONCE, faults) for faults in (Faults.FOR_GOOD, Faults.REPAIRED))
@@ -81,13 +81,13 @@ def check_machines(examination: Examination, cut: Cut, answers: Answers, timeout
         if told := difference(well.loop.net, one.loop, repaired=one is repaired):
             raise NotShownError(f"a machine that fails is not one that takes longer: {told}", "evidence", PLANT)
     judging.judge_one(well.asked.of_any_fault(), LOOP, shown)
-    lost = against["loop.live"]
-    # A fault takes nothing of what is not live without it. What the document has no evidence on may be live, and what
-    # it has evidence on that could not be checked in time leaves the verdicts on faults without their premise.
-    live = [t.name for t in cut.net.transitions if t.name not in lost]
+    # A fault takes nothing of what is not live without it. Where there is no evidence on that, or it could not be
+    # checked in time, the verdicts on faults are left without their premise.
+    live = [t.name for t in cut.net.transitions if t.name not in lost["loop.live"]]
     if not live:
         return
-    judging = replace(judging, premise="" if all(lost.values()) else "it rests on 'loop.live', which is not shown")
+    if not examination.checked["loop.live"].shown:
+        judging = replace(judging, premise="it rests on 'loop.live', which is not shown")
     for question in well.asked.of_repairs(repaired.plant.may_fail, live):
         judging.judge_one(question, LOOP, shown)
     judging.judge(FAILING, failing, failing.asked.of_faults(live))
@@ -141,10 +141,10 @@ class _Judging:
 
     def judge(
         self, file: str, closed: _Closed, questions: Iterable[Question]
-    ) -> tuple[dict[str, ShownRecord], dict[str, dict[str, bool]]]:
+    ) -> tuple[dict[str, ShownRecord], dict[str, set[str]]]:
         """Judge the verdicts that one document shows, of one loop: what it says, of each property by its name.
 
-        And for each verdict, of what there is evidence that it is violated, and whether that is shown.
+        And for each verdict, of what there is evidence that it is violated.
         """
         questions = list(questions)
         net = replace(closed.loop.net, properties=tuple(prop for one in questions for prop in one.of.values()))
@@ -160,7 +160,7 @@ class _Judging:
             found[one.record.name] = one
         return found
 
-    def judge_one(self, question: Question, file: str, records: Mapping[str, ShownRecord]) -> dict[str, bool]:
+    def judge_one(self, question: Question, file: str, records: Mapping[str, ShownRecord]) -> set[str]:
         """Hold a verdict against the records of all that it comes down to: it must say what they say."""
         some = {of: records.get(f"property.{prop.name}") for of, prop in question.of.items()}
         decided = {of: one for of, one in some.items() if one is not None}
@@ -189,7 +189,7 @@ class _Judging:
         late = late or self.premise
         how = f"the loop closed anew with {PLANT}: {methods or 'there is nothing of the kind'}"
         self.examination.judge(verdict, shown=not late, method=how, only_claimed=late)
-        return {of: decided[of].shown for of in against if not decided[of].record.lacking}
+        return {of for of in against if not decided[of].record.lacking}
 
 
 def _asked(cut: Cut, loop: ClosedLoop) -> Iterator[Question]:

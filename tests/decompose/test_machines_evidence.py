@@ -14,8 +14,9 @@ from support.examples import some
 from support.remembered import answered, read
 
 from firable.analysis.check import check
-from firable.analysis.evidence.document import Record, document_from_text
+from firable.analysis.evidence.document import Document, Record, document_from_text
 from firable.analysis.goal import Limits
+from firable.analysis.loop.families import Answered
 from firable.decompose.bundling import make_bundle
 from firable.decompose.proofs import closed_loops
 from firable.decompose.proofs.closed_loops import sealed_loops
@@ -511,6 +512,28 @@ def test_what_rests_on_a_loss_that_could_not_be_checked_in_time_is_only_claimed(
     assert {one.only_claimed for one in of_faults} == {"it rests on 'loop.live', which is not shown"}
     assert examination.checked["loop.live"].only_claimed == "the time was over"
     _KNOWN[key] = found
+
+
+@pytest.mark.usefixtures("unchanged")
+def test_what_a_fault_takes_of_what_is_not_shown_to_be_live_is_only_claimed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What fires once does not fire again with a machine that has failed, and the fault is not to blame."""
+    found = Answered.document
+
+    def document(asked: Answered, limits: Limits | None = None) -> Document:
+        whole = found(asked, limits)
+        return replace(whole, records=tuple(one for one in whole.records if one.name != "property.loop.live.0"))
+
+    monkeypatch.setattr(Answered, "document", document)
+    net, plant = parse_net(STARTS), BENCH.replace("may_fail: repairable", "may_fail: for_good")
+    decomposition = split(net)
+    verdicts, files, _ = sealed_loops(decomposition, plant, Limits)
+    examination = Examination(Bundle(decomposition, verdicts, files))
+    check_machines(examination, Cut(net), answered, TIMEOUT_MS)
+    checked = examination.checked
+    assert checked["loop.live"].only_claimed == "undecided: the bundle itself does not say"
+    assert checked["fault.R"].verdict.subjects == ("warm", "go", "stay")
+    assert checked["fault.R"].only_claimed == "it rests on 'loop.live', which is not shown"
+    assert checked["fault.safe"].shown
 
 
 def test_a_plant_that_no_verdict_names_is_refused() -> None:
