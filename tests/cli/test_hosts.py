@@ -344,8 +344,12 @@ def test_an_operator_stops_the_machines_of_one_host_although_its_coordinator_nev
             told = next(found for line in process.stderr if (found := re.search(r"http://\S+", line)))
             never = next(line for line in process.stderr if "never-met: the coordinator was never reached" in line)
             assert f"(this one joins {at})" in never
-        assert main(["operate", told.group(), "situation", "--token-file", token]) == 0
-        assert "G2 is ready here, and is decided by the coordinator" in capsys.readouterr().out
+
+        def is_ready() -> bool:  # while something is kept, what waits is not told
+            assert main(["operate", told.group(), "situation", "--token-file", token]) == 0
+            return "G2 is ready here, and is decided by the coordinator" in capsys.readouterr().out
+
+        until(is_ready, "G2 is ready")
         assert main(["operate", told.group(), "emergency-stop", "--token-file", token]) == 0
         assert main(["operate", told.group(), "stop", "--token-file", token]) == 0
         out, _ = process.communicate(timeout=PATIENCE_SECONDS)
