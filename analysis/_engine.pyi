@@ -173,6 +173,17 @@ class Graph:
         With `within`, every marking before the target is in it (E[within U targets]); with `by`, by edges that fire one
         of these transitions. Needs the whole graph.
         """
+    def forward(
+        self,
+        sources: list[int] | bytes,
+        *,
+        max_seconds: float | None = None,
+        cancelled: Callable[[], bool] | None = None,
+    ) -> bytes:
+        """The bitmap of the markings that can be reached from some source, sources included.
+
+        Needs the whole graph. Cost: that of the exploration at most.
+        """
     def before(
         self,
         targets: list[int] | bytes,

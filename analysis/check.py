@@ -53,7 +53,7 @@ from firable.analysis.spaces.space import StateSpace
 from firable.analysis.temporal.queries import as_goal, question_of, temporal_question
 from firable.analysis.verdicts.behaviour import DEADLOCK_FREE, QUESTIONS
 from firable.nets.diagnostics import Diagnostic, InputError
-from firable.nets.net import Net, Property, PropertyKind, TemporalProperty
+from firable.nets.net import Net, TemporalProperty
 from firable.nets.queries import Query
 from firable.nets.temporal import Logic
 from firable.nets.verdict import Cost, Status, Verdict, spelled
@@ -360,9 +360,7 @@ class _Check:
         if not graph.complete:
             ends[str(graph.engine.reason)] = graph
         graph.require_complete()
-        stated = (of for of in self.net.properties if isinstance(of, Property))
-        searches = sum(of.kind is PropertyKind.ALWAYS_POSSIBLE for of in stated)
-        worth_seconds = _WAITED_SHARE * searches * (monotonic() - began)
+        worth_seconds = _WAITED_SHARE * len(self.net.possibilities) * (monotonic() - began)
         until = _share(limits.deadline, _WAITED_SHARE_MAX).within(worth_seconds)
         while not until.over and not (limits.second_free is not None and limits.second_free()):
             sleep(_WAITED_TURN_SECONDS)

@@ -408,6 +408,12 @@ class Net:
         return self.signals[self.signal_index[name]]
 
     @cached_property
+    def possibilities(self) -> tuple[Property, ...]:
+        """Its properties that say of something that it is always possible (AG EF p)."""
+        stated = (of for of in self.properties if isinstance(of, Property))
+        return tuple(of for of in stated if of.kind is PropertyKind.ALWAYS_POSSIBLE)
+
+    @cached_property
     def coordinator(self) -> Controller | None:
         """The controller marked as coordinator, if the net has one."""
         return next((controller for controller in self.controllers if controller.coordinator), None)

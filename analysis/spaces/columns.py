@@ -135,3 +135,8 @@ def first(markings: Column) -> int | None:
     """The lowest marking of a set, which is one nearest to M0; None where the set is empty."""
     index = int(np.argmax(markings)) if len(markings) else 0
     return index if len(markings) and markings[index] else None
+
+
+def last(markings: Column) -> int:
+    """The highest marking of a set that is not empty."""
+    return len(markings) - 1 - int(np.argmax(markings[::-1]))

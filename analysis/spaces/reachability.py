@@ -292,6 +292,18 @@ class ReachabilityGraph(Derived["Column"]):
         bitmap = self.engine.backward(targets.tobytes(), inside, None if by is None else list(by), **self._limits)
         return _column(bitmap)
 
+    def forward(self, sources: Column) -> Column:
+        """The markings that can be reached from one of some, those included."""
+        return _column(self.engine.forward(sources.tobytes(), **self._limits))
+
+    def one_of(self, markings: Column) -> Column:
+        """The set of one marking of a set that is not empty: the one that is furthest from M0, as good as any."""
+        from firable.analysis.spaces.columns import last
+
+        found = self.none()
+        found[last(markings)] = True
+        return found
+
     def endless(self, within: Column | None = None) -> Column:
         """The markings from which a run can go on for ever inside `within` (EG over infinite runs only)."""
         return _column(self.engine.endless(None if within is None else within.tobytes(), **self._limits))

@@ -20,6 +20,7 @@ from math import inf
 from typing import Any, Generic, Protocol, TypeVar
 
 from firable.analysis.deadline import Deadline
+from firable.analysis.spaces.bottoms import Bottoms
 from firable.nets.formula import Formula
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import Cost, Witness
@@ -150,6 +151,14 @@ class StateSpace(Protocol[S]):
         """The markings from which a run can go on for ever inside `within` (EG over infinite runs only)."""
         ...
 
+    def forward(self, sources: S) -> S:
+        """The markings that can be reached from one of some, those included."""
+        ...
+
+    def one_of(self, markings: S) -> S:
+        """The set of one marking, whichever, of a set that is not empty."""
+        ...
+
     def bottom(self) -> S:
         """The markings of one bottom component: they reach each other, and nothing leads out of them."""
         ...
@@ -209,6 +218,15 @@ class StateSpace(Protocol[S]):
 
     def home(self) -> S:
         """The home markings: those that can be reached from every reachable marking."""
+        ...
+
+    def bottom_after(self, markings: S) -> S:
+        """The markings of a bottom component that can be reached from some marking of a set that is not empty."""
+        ...
+
+    @property
+    def bottoms(self) -> Bottoms[S]:
+        """The bottom components, as far as it is worth it to find them for the properties of the net."""
         ...
 
     def marked_together(self, pairs: Sequence[tuple[int, int]]) -> Sequence[bool]:
@@ -288,6 +306,24 @@ class Derived(Generic[S]):
         """The home markings: the bottom component, where every marking leads into it."""
         bottom = self.bottom()
         return bottom if self.count(self.backward(bottom)) == self.n_markings else self.algebra.disjunction(())
+
+    def bottom_after(self: StateSpace[S], markings: S) -> S:
+        """The markings of a bottom component that can be reached from some marking of a set that is not empty."""
+        while True:
+            one = self.one_of(markings)
+            after = self.forward(one)
+            rest = self.algebra.conjunction([after, self.algebra.negation(self.backward(one, after))])
+            if not self.count(rest):
+                return after
+            markings = rest  # from none of them can that one be reached again, so this ends
+
+    @cached_property
+    def bottoms(self: StateSpace[S]) -> Bottoms[S]:
+        """The bottom components, as far as it is worth it to find them for the properties of the net.
+
+        One takes some three searches, and without them each property takes one.
+        """
+        return Bottoms(self, len(self.net.possibilities) // 3)
 
     def marked_together(self: StateSpace[S], pairs: Sequence[tuple[int, int]]) -> Sequence[bool]:
         """For each pair of places, whether some marking found has a token on both."""

@@ -199,19 +199,17 @@ class SymbolicSpace(Derived[MarkingSet]):
         """The markings from which a run can go on for ever inside `within` (EG over infinite runs only)."""
         return self.engine.endless(self.reach if within is None else within)
 
+    def forward(self, sources: MarkingSet) -> MarkingSet:
+        """The markings that can be reached from one of some, those included."""
+        return self.engine.forward(sources)
+
+    def one_of(self, markings: MarkingSet) -> MarkingSet:
+        """The set of one marking of a set that is not empty."""
+        return self.engine.single(markings.any() or [])
+
     def bottom(self) -> MarkingSet:
         """The markings of one bottom component; a deadlock where there is one."""
-        return self._bottom_after(self.deadlocks or self.initial)
-
-    def _bottom_after(self, markings: MarkingSet) -> MarkingSet:
-        """The markings of a bottom component that can be reached from some marking of a set that is not empty."""
-        while True:
-            one = self.engine.single(markings.any() or [])
-            after = self.engine.forward(one)
-            back = self.backward(one, after)
-            if back == after:
-                return after
-            markings = after - back  # from none of them can that one be reached again, so this ends
+        return self.bottom_after(self.deadlocks or self.initial)
 
     def reversible(self) -> bool:
         """Whether M0 can be reached from every marking."""
@@ -234,7 +232,7 @@ class SymbolicSpace(Derived[MarkingSet]):
         live = [True] * len(self.net.transitions)
         left = self.reach
         while left and any(live):
-            bottom = self._bottom_after(self.initial & left or left)
+            bottom = self.bottom_after(self.initial & left or left)
             live = [before and here for before, here in zip(live, self._fire_in(bottom), strict=True)]
             left -= self.backward(bottom)
         return live
@@ -311,11 +309,11 @@ class SymbolicSpace(Derived[MarkingSet]):
 
         Raises `WitnessError` where it does not replay, `BudgetExceeded` where none is found of a set that is not empty.
         """
+        if not targets:
+            return None
         found = self.engine.path_to(targets)
         if found is None:
-            if targets:
-                raise BudgetExceeded("the search for a firing sequence was given up")
-            return None
+            raise BudgetExceeded("the search for a firing sequence was given up")
         firings, marked, _ = found
         return self.witnesses.replayed([(t,) for t in firings], sum(1 << place for place in marked), note)
 

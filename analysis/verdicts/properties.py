@@ -2,14 +2,16 @@
 
 Each kind is one temporal pattern over state formulas, with its own method and its own counterexample: `never` and
 `always` by looking at every marking, `reachable` by finding one, `always_possible` (AG EF p) by the backward closure
-of p, `leads_to` by fair components (`firable.analysis.verdicts.leads_to`). The shortest firing sequence to a marking
-that violates the property is the evidence; for `reachable` the sequence is the proof. What no pattern says is a formula
-of CTL or LTL (`firable.analysis.temporal`).
+of p, or where many are stated by the bottom components (`firable.analysis.spaces.bottoms`), `leads_to` by fair
+components (`firable.analysis.verdicts.leads_to`). The shortest firing sequence to a marking that violates the property
+is the evidence, of many always possible ones that to where nothing can be done about it any more; for `reachable` the
+sequence is the proof. What no pattern says is a formula of CTL or LTL (`firable.analysis.temporal`).
 """
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
+from typing import Any, Final
 
 from firable.analysis.question import Answer, Question, no, yes
 from firable.analysis.spaces.space import StateSpace
@@ -18,6 +20,8 @@ from firable.nets.formula import Not, format_formula
 from firable.nets.net import Fairness, Property, PropertyKind, TemporalProperty
 from firable.nets.verdict import Verdict
 
+SEARCHED_MAX: Final = 8
+"""So many properties to be always possible are searched for one by one, and shown where they are lost first."""
 _FAIRNESS = {
     Fairness.NONE: "without any assumption of fairness",
     Fairness.WEAK: "under weak fairness (a transition that stays firable fires; its external gates do open)",
@@ -92,6 +96,11 @@ def _reachable(space: StateSpace[Any], of: Property) -> Answer:
 
 
 def _always_possible(space: StateSpace[Any], of: Property) -> Answer:
-    lost = space.algebra.negation(space.backward(space.satisfying(of.formula)))
-    witness = space.witness(lost, f"from here ({format_formula(of.formula)}) can never be reached again")
+    goal, note = space.satisfying(of.formula), f"from here ({format_formula(of.formula)}) can never be reached again"
+    if len(space.net.possibilities) > SEARCHED_MAX:
+        if (run := space.bottoms.where_lost(goal)) is not None:
+            return no((), replace(run, note=note))
+        if space.bottoms.all_found:
+            return yes()
+    witness = space.witness(space.algebra.negation(space.backward(goal)), note)
     return yes() if witness is None else no((), witness)

@@ -15,7 +15,7 @@ from support.ring_nets import ring_nets
 from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
 from firable.analysis.spaces.space import WitnessError
 from firable.analysis.verdicts.leads_to import check_lasso
-from firable.analysis.verdicts.properties import decide_property, statement
+from firable.analysis.verdicts.properties import SEARCHED_MAX, decide_property, statement
 from firable.nets.formula import Formula, parse_formula
 from firable.nets.net import Fairness, Marking, Net, Place, Property, PropertyKind, Transition
 from firable.nets.verdict import Status, Verdict
@@ -24,9 +24,22 @@ from firable.semantics.formulas import evaluate
 from firable.semantics.player import FiringSet, Player, holds_in
 from firable.semantics.trace import Discipline
 
-FORMULAS = st.sampled_from(
-    ["a", "b", "not a", "a and not b", "a or b", "start", "deadlock", "firable(t0)", "not firable(t1)", "false", "true"]
-).map(parse_formula)
+STATED = [
+    *(
+        "a",
+        "b",
+        "not a",
+        "a and not b",
+        "a or b",
+        "start",
+        "deadlock",
+        "firable(t0)",
+        "not firable(t1)",
+        "false",
+        "true",
+    )
+]
+FORMULAS = st.sampled_from(STATED).map(parse_formula)
 SITUATIONS = st.tuples(ring_nets(signals=True), st.sampled_from(Discipline)).filter(
     lambda drawn: len(drawn[0].transitions) > 1
 )
@@ -73,6 +86,43 @@ def test_properties_of_markings_are_decided_by_their_definitions(
         if verdict.witness is not None:
             assert net.marking(verdict.witness.marking) in shown
             assert len(verdict.witness.firings) == min(away[m] for m in shown)
+
+
+@examples(75)
+@given(SITUATIONS)
+def test_of_many_properties_to_be_always_possible_the_same_hold(situation: tuple[Net, Discipline]) -> None:
+    net, discipline = situation
+    formulas = map(parse_formula, STATED)
+    stated = [replace(prop(PropertyKind.ALWAYS_POSSIBLE, of), name=f"x{i}") for i, of in enumerate(formulas)]
+    assert len(stated) > SEARCHED_MAX
+    many = explore(replace(net, properties=tuple(stated)), discipline)
+    truth = graph_of(net, discipline)
+    for of in stated:
+        good = satisfying(net, of.formula, set(truth))
+        lost = {m for m in truth if not (nx.descendants(truth, m) | {m}) & good}
+        verdict = decide_property(many, of)
+        assert verdict.status is (Status.VIOLATED if lost else Status.PROVED)
+        assert (verdict.witness is not None) == bool(lost)
+        if verdict.witness is not None:
+            assert net.marking(verdict.witness.marking) in lost
+            assert verdict.witness.note.endswith("can never be reached again")
+
+
+def test_more_bottom_components_than_are_looked_for_leave_no_property_proved() -> None:
+    choices = range(6)
+    places = [Place("m0", marked=True), *(Place(f"{side}{i}") for i in choices for side in "ab")]
+    enter = [Transition(f"enter{i}", ("m0",), (f"a{i}",)) for i in choices]
+    there = [Transition(f"there{i}", (f"a{i}",), (f"b{i}",)) for i in choices]
+    back = [Transition(f"back{i}", (f"b{i}",), (f"a{i}",)) for i in choices]
+    all_but = [" or ".join(f"b{i}" for i in choices if i != without) for without in choices]
+    texts = [*all_but, " or ".join(f"b{i}" for i in choices), "a0 or not a0", "a0"]
+    stated = [
+        replace(prop(PropertyKind.ALWAYS_POSSIBLE, parse_formula(text)), name=f"x{i}") for i, text in enumerate(texts)
+    ]
+    assert SEARCHED_MAX < len(stated) < 3 * len(choices)
+    graph = explore(Net("choices", tuple(places), (*enter, *there, *back), properties=tuple(stated)))
+    verdicts = [decide_property(graph, of) for of in stated]
+    assert [verdict.holds for verdict in verdicts] == [*(False for _ in choices), True, True, False]
 
 
 def recurs(net: Net, truth: nx.MultiDiGraph[Marking], among: frozenset[Marking], fairness: Fairness) -> bool:

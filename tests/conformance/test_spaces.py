@@ -19,6 +19,7 @@ from support.timed_nets import timed_nets
 
 from firable.analysis.goal import Limits
 from firable.analysis.methods import SPACES, Method
+from firable.analysis.spaces.bottoms import Bottoms
 from firable.analysis.spaces.reachability import explore
 from firable.analysis.spaces.space import StateSpace
 from firable.nets.net import Marking, Net
@@ -107,6 +108,9 @@ def test_a_space_has_the_sets_of_the_oracle(name: str, net: Net, data: st.DataOb
     by = data.draw(st.sets(st.sampled_from(list(transitions)))) if transitions else set()
     same(space.before(targets[0], by), oracle.before(targets[1], by))
     same(space.backward(targets[0]), oracle.backward(targets[1]))
+    same(space.forward(targets[0]), oracle.forward(targets[1]))
+    assert space.count(space.one_of(targets[0])) == 1
+    assert any(space.contains(space.one_of(targets[0]), marking) for marking in targets[1])
     same(space.backward(targets[0], within[0]), oracle.backward(targets[1], within[1]))
     same(space.backward(targets[0], by=by), oracle.backward(targets[1], by=by))
     same(space.backward(targets[0], within[0], by), oracle.backward(targets[1], within[1], by))
@@ -118,6 +122,29 @@ def test_a_space_has_the_sets_of_the_oracle(name: str, net: Net, data: st.DataOb
     assert witness.note == "here"
     assert net.marking(witness.marking) in targets[1]
     assert space.witness(space.algebra.disjunction(())) is None
+
+
+@pytest.mark.parametrize("name", HELD)
+@given(net=st.one_of(lively_nets(), dense_nets(signals=True)), data=st.data())
+def test_bottom_components_tell_of_every_goal_whether_it_is_lost_somewhere(
+    name: str, net: Net, data: st.DataObject
+) -> None:
+    space = HELD[name](net)
+    both = Pairing(space)
+    oracle, reached = both.oracle, sorted(both.oracle.graph)
+    all_, few = Bottoms(space, len(reached)), Bottoms(space, data.draw(st.integers(0, 2)))
+    for _ in range(6):
+        drawn = data.draw(st.lists(st.sampled_from(reached), max_size=len(reached), unique=True))
+        sets = [both.given(marking) for marking in drawn]
+        goal = space.algebra.disjunction(mine for mine, _ in sets)
+        again = oracle.backward(frozenset(drawn))
+        for bottoms in (all_, few):
+            run = bottoms.where_lost(goal)
+            if run is not None:
+                assert net.marking(run.marking) not in again
+            elif bottoms.all_found:
+                assert again == oracle.algebra.true
+            assert run is not None or bottoms.all_found or bottoms is few
 
 
 @pytest.mark.parametrize("method", SPACES)

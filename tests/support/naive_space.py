@@ -139,16 +139,26 @@ class NaiveSpace(Derived[Markings]):
             found = fewer
         return found
 
+    def forward(self, sources: Markings) -> Markings:
+        """What can be reached from the sources, and these."""
+        reached, more = set(sources), list(sources)
+        while more:
+            after = {after for _, after in self.graph[more.pop()]} - reached
+            reached |= after
+            more += after
+        return frozenset(reached)
+
+    def one_of(self, markings: Markings) -> Markings:
+        """The smallest marking."""
+        return frozenset({min(markings)})
+
     def bottom(self) -> Markings:
         """The markings of the first bottom component: what can be reached from one of them, and leads back to it."""
         for marking in self.graph:
-            reached, more = {marking}, [marking]
-            while more:
-                after = {after for _, after in self.graph[more.pop()]} - reached
-                reached |= after
-                more += after
-            if reached <= self.backward(frozenset({marking})):
-                return frozenset(reached)
+            one = frozenset({marking})
+            reached = self.forward(one)
+            if reached <= self.backward(one):
+                return reached
         raise AssertionError("a finite graph has a bottom component")
 
     def home(self) -> Markings:

@@ -171,7 +171,32 @@ pub fn backward(
     Ok(search.reach.to_bytes(space.len()))
 }
 
-/// A search against the edges: what it has reached, and what of that it has not looked behind.
+/// The markings that can be reached from a source, one byte each, sources included.
+pub fn forward(space: &Space, sources: &[u8], watch: &mut Watch<'_>) -> Result<Vec<u8>, Stop> {
+    let memory = space.memory.clone();
+    let mut search = Search::new(space, sources, None, &memory)?;
+    if space.step {
+        return search.along(&Csr::new(space, None, &memory, watch)?, watch);
+    }
+    let transitions = space.net.transitions.len();
+    let mut fan = Fan::forward(space, watch)?;
+    let mut taken = Vec::with_capacity(64);
+    with_width!(space.net.words, width => {
+        while search.agenda.take(&mut taken) {
+            let mut edges = 0;
+            fan.load(width, &taken);
+            fan.each(width, !0, 0..transitions, &mut |_, _, target| {
+                edges += 1;
+                search.meet(target);
+                false
+            });
+            watch.tick(taken.len() + edges + transitions)?;
+        }
+    });
+    Ok(search.reach.to_bytes(space.len()))
+}
+
+/// A search along or against the edges: what it has reached, and what of that it has not looked behind.
 struct Search<'a> {
     reach: Bits,
     agenda: Agenda,
@@ -186,24 +211,24 @@ impl<'a> Search<'a> {
         Ok(Search { reach, agenda, within })
     }
 
-    /// A marking has an edge to one that was reached.
+    /// A marking is at the other end of an edge of one that was reached.
     #[inline(always)]
-    fn meet(&mut self, source: u32) {
-        let source = source as usize;
-        if !self.reach.has(source) && self.within.is_none_or(|within| within[source] != 0) {
-            self.reach.add(source);
-            self.agenda.add(source);
+    fn meet(&mut self, index: u32) {
+        let index = index as usize;
+        if !self.reach.has(index) && self.within.is_none_or(|within| within[index] != 0) {
+            self.reach.add(index);
+            self.agenda.add(index);
         }
     }
 
-    /// Goes on along edges that are turned round, to the end.
+    /// Goes on along stored edges, which are turned round where it goes against them, to the end.
     fn along(mut self, edges: &Csr, watch: &mut Watch<'_>) -> Result<Vec<u8>, Stop> {
         let mut taken = Vec::with_capacity(64);
         while self.agenda.take(&mut taken) {
             for &index in &taken {
-                let sources = edges.targets(index);
-                sources.iter().for_each(|&source| self.meet(source));
-                watch.tick(1 + sources.len())?;
+                let others = edges.targets(index);
+                others.iter().for_each(|&other| self.meet(other));
+                watch.tick(1 + others.len())?;
             }
         }
         Ok(self.reach.to_bytes(edges.offsets.len() - 1))

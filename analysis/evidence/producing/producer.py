@@ -42,7 +42,7 @@ from firable.analysis.goal import Finding, Limits
 from firable.analysis.report import CheckReport
 from firable.analysis.verdicts.behaviour import DEADLOCK_FREE
 from firable.nets.formula import And, Deadlock, Firable, Formula, Holds, Not, Start
-from firable.nets.net import Marking, Net, Property, PropertyKind, TemporalProperty
+from firable.nets.net import Marking, Property, TemporalProperty
 from firable.nets.queries import Query, QueryKind, format_query
 from firable.nets.temporal import Logic, Temporal, TemporalAnd, TemporalNot, TemporalOr
 from firable.nets.verdict import Status, Verdict, Witness
@@ -316,7 +316,7 @@ class _Verdicts:
         if isinstance(of, TemporalProperty):
             return self._temporal(of.logic, of.formula, verdict, proved)
         claim = property_claim(of, proved=proved)
-        if claim.kind is ClaimKind.ALWAYS_POSSIBLE and _possibilities(self.net) > 1:
+        if claim.kind is ClaimKind.ALWAYS_POSSIBLE and len(self.net.possibilities) > 1:
             try:
                 return iter(self._from_home(claim.state_goal))
             except LackingError:
@@ -418,12 +418,6 @@ class _Verdicts:
 
 _ALL_LIVE: Final = frozenset({"live"})
 _DEAD: Final = frozenset({QueryKind.LIVE, QueryKind.QUASI_LIVE})
-
-
-def _possibilities(net: Net) -> int:
-    """How many properties say that something is always possible."""
-    kinds = (of.kind for of in net.properties if isinstance(of, Property))
-    return sum(kind is PropertyKind.ALWAYS_POSSIBLE for kind in kinds)
 
 
 def _possible(name: str) -> Claim:

@@ -279,6 +279,21 @@ impl Graph {
         Ok(PyBytes::new(py, &reach))
     }
 
+    #[pyo3(signature = (sources, *, max_seconds=None, cancelled=None))]
+    fn forward<'py>(
+        &self,
+        py: Python<'py>,
+        sources: Markings<'_>,
+        max_seconds: Option<f64>,
+        cancelled: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyBytes>> {
+        let patience = Patience::new(max_seconds, cancelled)?;
+        self.whole("forward reach")?;
+        let sources = self.bitmap(sources)?;
+        let reach = self.long(py, &patience, |space, watch| fixpoints::forward(space, &sources, watch))?;
+        Ok(PyBytes::new(py, &reach))
+    }
+
     #[pyo3(signature = (within, fairness, *, max_seconds=None, cancelled=None))]
     fn fair<'py>(
         &self,
