@@ -6,8 +6,9 @@ places send different commands to one machine. Verdicts that are read off the ne
 off it again.
 
 Some verdicts have several ways. That a transition is live may be said of it alone, or by a home marking: from
-everywhere one marking can be reached, and from that one a run fires the transition. That no marking is doomed says the
-same as that none is a deadlock: a deadlock is doomed, and where there is none every run goes on.
+everywhere one marking can be reached, and from that one a run fires the transition. What holds in every deadlock is
+always possible where some deadlock can be reached from everywhere. That no marking is doomed says the same as that none
+is a deadlock: a deadlock is doomed, and where there is none every run goes on.
 
 The techniques have formulas of their own for the same things (`firable.analysis.verdicts`); tests hold the two to each
 other.
@@ -122,6 +123,11 @@ def senders(net: Net) -> dict[str, dict[str, tuple[str, ...]]]:
     }
 
 
+def deadlock_without(goal: Formula) -> Formula:
+    """A deadlock in which the goal does not hold."""
+    return tidy(And((Deadlock(), Not(goal))))
+
+
 def some_firable(names: Iterable[str]) -> Formula:
     """One of these transitions may fire."""
     return _some(Firable(name) for name in names)
@@ -156,8 +162,15 @@ class Shown:
         return name in self.fired_at_home or possible in self or Claim(ClaimKind.LIVE) in self
 
     def possible(self, goal: Formula) -> bool:
-        """Whether it is shown that the goal can be reached from everywhere: by itself, or from a home marking."""
-        return goal in self.met_at_home or Claim(ClaimKind.ALWAYS_POSSIBLE, goal) in self
+        """Whether it is shown that the goal can be reached from everywhere.
+
+        By itself, from a home marking, or as it holds in each deadlock, and some can be reached from everywhere.
+        """
+        by_itself = goal in self.met_at_home or Claim(ClaimKind.ALWAYS_POSSIBLE, goal) in self
+        return by_itself or (
+            Claim(ClaimKind.ALWAYS_POSSIBLE, Deadlock()) in self
+            and Claim(ClaimKind.NEVER, deadlock_without(goal)) in self
+        )
 
     def fires(self, name: str) -> bool:
         """Whether a transition is shown to fire in some run."""

@@ -32,11 +32,12 @@ from firable.analysis.evidence.producing.claims import Certifier
 from firable.analysis.evidence.producing.lacking import LackingError
 from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.goal import Limits
+from firable.analysis.methods import Method
 from firable.analysis.spaces.reachability import explore
 from firable.analysis.temporal.queries import answer
 from firable.analysis.verdicts.goals import goals_of
 from firable.nets.diagnostics import InputError
-from firable.nets.formula import And, Constant, Firable, Formula, Holds, Not, Or, Start
+from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Or, Start
 from firable.nets.net import ExternalGate, Fairness, Net, Place, Property, PropertyKind, Signal, Transition
 from firable.nets.queries import Query, QueryKind
 from firable.nets.temporal import Temporal, parse_temporal
@@ -242,6 +243,22 @@ def test_the_home_marking_of_a_net_of_one_place_is_shown() -> None:
     checked = {found.record.name: found for found in check_document(evidence_of_report(check(one)))}
     assert checked["home-markings"].record.proved
     assert checked["home-markings"].shown
+
+
+@pytest.mark.parametrize("method", [Method.EXPLICIT, Method.SYMBOLIC])
+def test_what_holds_in_every_deadlock_is_shown_by_one_search_against_the_edges(method: Method) -> None:
+    moves = [("p", "a"), ("a", "p"), ("a", "left"), ("a", "right")]
+    places = [Place(name, marked=name == "p") for name in ("p", "a", "left", "right")]
+    goals = [Not(Holds("p")), Not(Holds("a")), Or((Holds("left"), Holds("right"))), Holds("left")]
+    stated = [Property(f"x{i}", PropertyKind.ALWAYS_POSSIBLE, goal) for i, goal in enumerate(goals)]
+    transitions = [Transition(f"t{i}", (source,), (target,)) for i, (source, target) in enumerate(moves)]
+    net = Net("ends", tuple(places), tuple(transitions), properties=tuple(stated))
+    checked = {found.record.name: found for found in check_document(evidence_of_report(check(net, method=method)))}
+    of = [checked[f"property.x{i}"] for i in range(len(goals))]
+    assert [one.record.proved for one in of] == [True, True, True, False]
+    assert all(one.shown for one in of)
+    ends = Claim(ClaimKind.ALWAYS_POSSIBLE, Deadlock())
+    assert [ends in (claim for claim, _ in one.record.shown) for one in of] == [True, True, True, False]
 
 
 # --------------------------------------------------------------------------------------------------------------------

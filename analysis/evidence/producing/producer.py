@@ -26,6 +26,7 @@ from firable.analysis.evidence.meaning import (
     competing,
     completions_clash,
     contact,
+    deadlock_without,
     never_beside,
     property_claim,
     senders,
@@ -317,10 +318,11 @@ class _Verdicts:
             return self._temporal(of.logic, of.formula, verdict, proved)
         claim = property_claim(of, proved=proved)
         if claim.kind is ClaimKind.ALWAYS_POSSIBLE and len(self.net.possibilities) > 1:
-            try:
-                return iter(self._from_home(claim.state_goal))
-            except LackingError:
-                pass  # there is no home marking, or it is not known
+            for from_there in (self._from_home, self._from_deadlocks):
+                try:
+                    return iter(from_there(claim.state_goal))
+                except LackingError:
+                    continue  # there is no such marking, or it is not known
         return self._one(claim, verdict.witness)
 
     @cached_property
@@ -345,6 +347,25 @@ class _Verdicts:
         shown = self._at_home()
         later = Claim(ClaimKind.LATER, shown[0].state_goal, then=goal)
         return [shown, (later, self.certifier.later(goal))]
+
+    @cached_property
+    def _ends_shown(self) -> tuple[Claim, Certificate] | str:
+        """That some deadlock can be reached from everywhere, or why that is not shown: looked for once."""
+        claim = Claim(ClaimKind.ALWAYS_POSSIBLE, Deadlock())
+        try:
+            return claim, self.certifier.certify(claim)
+        except LackingError as error:
+            return str(error)
+
+    def _from_deadlocks(self, goal: Formula) -> Shown:
+        """That a goal is always possible, since some deadlock is, and the goal holds in each; raises `LackingError`."""
+        if isinstance(self._ends_shown, str):
+            raise LackingError(self._ends_shown)
+        never = deadlock_without(goal)
+        all_ = self.certifier.nevers.at_hand(never)
+        if all_ is None:
+            raise LackingError("that the goal holds in every deadlock is not certified")
+        return [self._ends_shown, (Claim(ClaimKind.NEVER, never), all_)]
 
     def _temporal(
         self, logic: Logic | QueryKind, formula: Temporal, verdict: Verdict, proved: bool
