@@ -249,7 +249,7 @@ def test_the_home_marking_of_a_net_of_one_place_is_shown() -> None:
 def test_what_holds_in_every_deadlock_is_shown_by_one_search_against_the_edges(method: Method) -> None:
     moves = [("p", "a"), ("a", "p"), ("a", "left"), ("a", "right")]
     places = [Place(name, marked=name == "p") for name in ("p", "a", "left", "right")]
-    goals = [Not(Holds("p")), Not(Holds("a")), Or((Holds("left"), Holds("right"))), Holds("left")]
+    goals: list[Formula] = [Not(Holds("p")), Not(Holds("a")), Or((Holds("left"), Holds("right"))), Holds("left")]
     stated = [Property(f"x{i}", PropertyKind.ALWAYS_POSSIBLE, goal) for i, goal in enumerate(goals)]
     transitions = [Transition(f"t{i}", (source,), (target,)) for i, (source, target) in enumerate(moves)]
     net = Net("ends", tuple(places), tuple(transitions), properties=tuple(stated))
