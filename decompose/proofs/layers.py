@@ -55,8 +55,7 @@ def apart(sides: Sides) -> Iterator[Obligation]:
     for subnet in sides.subnets:
         its = {t: at[whole] for t in range(len(subnet.transitions)) if (whole := sides.whole_of(subnet, t)) in at}
         for t, u in _disturbing(subnet, its):
-            if its[t] != its[u]:
-                never.append(terms.negation(terms.conjunction([_yes(terms, subnet, t), _yes(terms, subnet, u)])))
+            never.append(terms.negation(terms.conjunction([_yes(terms, subnet, t), _yes(terms, subnet, u)])))
     yield claimed(
         terms,
         "o8-apart",
@@ -65,8 +64,8 @@ def apart(sides: Sides) -> Iterator[Obligation]:
     )
 
 
-def _disturbing(subnet: Net, its: Iterable[int]) -> list[tuple[int, int]]:
-    """The pairs of these parts of which firing one could change what the other one reads (O1).
+def _disturbing(subnet: Net, its: Mapping[int, str]) -> list[tuple[int, int]]:
+    """The pairs of these parts, asked for by two coordinators, of which firing one could change what the other reads.
 
     Cost: those that meet at a place or a signal, not all pairs.
     """
@@ -80,7 +79,7 @@ def _disturbing(subnet: Net, its: Iterable[int]) -> list[tuple[int, int]]:
         gates = (gate.signal for gate in part.external)
         for name in (*part.inputs, *part.outputs, *part.permissive, *part.inhibitive, *gates):
             reading.setdefault(name, set()).add(t)
-    pairs = ((t, u) for name, some in moving.items() for t in some for u in reading.get(name, ()) if t != u)
+    pairs = ((t, u) for name, some in moving.items() for t in some for u in reading.get(name, ()) if its[t] != its[u])
     return sorted({(min(pair), max(pair)) for pair in pairs})
 
 
@@ -129,7 +128,7 @@ def _deciders(sides: Sides, tree: Layers) -> Obligation:
     together: dict[str, list[str]] = {name: [name] for name in central}
     groups: dict[str, list[str]] = {}
     for group in arbitration.groups:
-        members = [net.transitions[t].name for t in dict.fromkeys((*group.sequence, *group.rest))]
+        members = [net.transitions[t].name for t in (*group.sequence, *group.rest)]
         if any(name in central for name in members):
             groups[group.name] = members
             together.update(dict.fromkeys(members, members))

@@ -91,6 +91,14 @@ def test_two_commands_that_one_signal_completes_do_not_contend_and_one_that_wait
     assert decided(commanding(asks=True)) == {"within": None, "over": None}
 
 
+LOWER = (
+    *(Controller("r", under="cell"), Controller("m", under="cell")),
+    *(Controller("cell", under="line"), Controller("x", under="line"), Controller("line")),
+)
+"""The same under a coordinator more, and listed in another order."""
+
+
+@pytest.mark.parametrize("controllers", [CONTROLLERS, LOWER], ids=["in two layers", "in three layers"])
 @pytest.mark.parametrize(
     "net",
     [
@@ -102,11 +110,18 @@ def test_two_commands_that_one_signal_completes_do_not_contend_and_one_that_wait
     ],
     ids=["takes what is read", "fills what is read", "takes the same", "fills the same", "clears what is read"],
 )
-def test_left_below_it_is_refuted(net: Net) -> None:
-    decomposition = split(net)
+def test_left_below_it_is_refuted(net: Net, controllers: tuple[Controller, ...]) -> None:
+    transitions = net.transitions if controllers is CONTROLLERS else net.transitions[::-1]
+    decomposition = split(replace(net, controllers=controllers, transitions=transitions))
     rows = tuple(replace(row, at="cell") if row.name == "within" else row for row in decomposition.coordinated)
     edited = replace(decomposition, coordinated=rows)
     assert [verdict.name for verdict in prove(edited).verdicts if not verdict.holds] == ["o8", "o8-apart"]
+
+
+def test_the_highest_coordinator_is_the_same_by_its_name() -> None:
+    decomposition = split(line_and_cell(over(gates=(("r.p",), ()))))
+    rows = tuple(replace(row, at="line") if row.name == "within" else row for row in decomposition.coordinated)
+    assert prove(replace(decomposition, coordinated=rows)).holds
 
 
 def test_nothing_is_asked_of_one_layer() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -19,12 +20,13 @@ from firable.decompose.splitting.cut import split
 from firable.decompose.splitting.table import table_text
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net
+from firable.nets.decomposition import Part
 from firable.nets.diagnostics import InputError
 from firable.nets.interchange import net_digest, net_from_json, net_to_json
 from firable.nets.joining import join
 from firable.nets.knowledge import knowledge, reasons
 from firable.nets.layers import COORDINATOR, Layers
-from firable.nets.net import Arbiter, Controller, Net, Place, Transition
+from firable.nets.net import Arbiter, Controller, ExternalGate, Net, Place, Signal, Transition
 from firable.nets.printing import format_net
 from firable.nets.right_to_run import required_verdicts, unproved
 from firable.nets.text import parse_net
@@ -65,6 +67,24 @@ def test_a_transition_is_decided_by_the_lowest_coordinator_above_all_who_take_pa
     }
 
 
+@pytest.mark.parametrize(
+    "gate",
+    [{"permissive": ("k1.x",)}, {"inhibitive": ("k1.x",)}, {"external": (ExternalGate("k1.s"),)}],
+    ids=lambda gate: str(*gate),
+)
+def test_who_takes_part_by_a_gate_alone_is_under_who_decides(gate: dict[str, Any]) -> None:
+    net = three_deep()
+    transitions = tuple(replace(t, **gate) if t.name == "within" else t for t in net.transitions)
+    places, signals = (*net.places, Place("k1.x", "k1")), (Signal("k1.s", "k1"),)
+    decomposition = split(replace(net, places=places, transitions=transitions, signals=signals))
+    rows = {row.name: row for row in decomposition.coordinated}
+    assert rows["within"].at == "line1"
+    assert prove(decomposition).holds
+    too_low = tuple((rows | {"within": replace(rows["within"], at="c1")}).values())
+    refuted = {v.name for v in prove(replace(decomposition, coordinated=too_low)).verdicts if not v.holds}
+    assert refuted == {"o8", "o8.within"}
+
+
 def test_a_conflict_across_coordinators_goes_to_their_common_ancestor() -> None:
     decomposition = split(TWO_CELLS)
     assert {row.name: row.at for row in decomposition.table if row.at} == {
@@ -82,16 +102,19 @@ def test_a_conflict_across_coordinators_goes_to_their_common_ancestor() -> None:
     }
 
 
-def test_a_conflict_within_a_cell_is_decided_there() -> None:
-    net = three_deep()
-    rival = Transition("rival", ("c1.within",), ("c1.all",))
-    net = replace(net, transitions=(*net.transitions, rival), places=(*net.places, Place("c1.x", "c1")))
-    net = replace(net, transitions=(*net.transitions[:-1], replace(rival, outputs=("c1.x",))))
-    decomposition = split(net)
+@pytest.mark.parametrize("first", [True, False], ids=["the local one first", "the local one last"])
+def test_a_conflict_within_a_cell_is_decided_there(first: bool) -> None:
+    net, rival = three_deep(), Transition("rival", ("c1.within",), ("c1.x",))
+    transitions = (rival, *net.transitions) if first else (*net.transitions, rival)
+    decomposition = split(replace(net, transitions=transitions, places=(*net.places, Place("c1.x", "c1"))))
     (group,) = decomposition.groups
     assert (group.at, group.controller) == ("c1", None)
     assert {row.name: row.at for row in decomposition.coordinated if not row.is_global} == {"rival": "c1"}
-    assert prove(decomposition).holds
+    proof = prove(decomposition)
+    assert proof.holds
+    names = {verdict.name for verdict in proof.verdicts if verdict.name.startswith("o8")}
+    assert names == {name for name in required_verdicts(decomposition) if name.startswith("o8")}
+    assert "o8.rival" not in names, "one vote is not added up"
 
 
 def test_two_cells_have_the_figures_that_they_are_shown_with() -> None:
@@ -139,8 +162,22 @@ def test_layers_are_proved_and_required() -> None:
 def test_a_row_that_another_coordinator_would_decide_is_refuted(at: str) -> None:
     decomposition = split(TWO_CELLS)
     rows = tuple(replace(row, at=at) if row.name == "load_a" else row for row in decomposition.coordinated)
-    refuted = [v.name for v in prove(replace(decomposition, coordinated=rows)).verdicts if not v.holds]
-    assert refuted == ["o8", "o8.load_a", "o8-apart"]  # it conflicts with what the line decides at the robot
+    refuted = [v for v in prove(replace(decomposition, coordinated=rows)).verdicts if not v.holds]
+    assert [v.name for v in refuted] == ["o8", "o8.load_a", "o8-apart"]  # the line decides what it conflicts with
+    votes = refuted[1]
+    assert votes.subjects == ("load_a",)
+    assert votes.witness is not None
+    assert votes.witness.note == f"the votes of all parts: 0, the vote at '{at}': 1"
+
+
+def test_a_part_that_nobody_has_gives_no_vote_in_layers_either() -> None:
+    decomposition = split(TWO_CELLS)
+    rows = tuple(
+        replace(row, parts=(*row.parts, Part("robot_a", "nothing"))) if row.name == "put_a" else row
+        for row in decomposition.coordinated
+    )
+    refuted = {v.name for v in prove(replace(decomposition, coordinated=rows)).verdicts if not v.holds}
+    assert {"eq7.put_a", "o3.put_a"} <= refuted
 
 
 def test_a_row_decided_too_high_up_and_a_group_in_another_layer_are_refuted() -> None:
@@ -153,6 +190,12 @@ def test_a_row_decided_too_high_up_and_a_group_in_another_layer_are_refuted() ->
     changed = [replace(decomposition, groups=its) for its in (groups, own)]
     for edited in (replace(decomposition, coordinated=rows), *changed):
         assert [verdict.name for verdict in prove(edited).verdicts if not verdict.holds] == ["o8"]
+
+
+def test_a_row_that_stands_twice_in_layers_is_refuted() -> None:
+    decomposition = split(TWO_CELLS)
+    twice = replace(decomposition, coordinated=(*decomposition.coordinated, decomposition.coordinated[0]))
+    assert "o8" in {verdict.name for verdict in prove(twice).verdicts if not verdict.holds}
 
 
 @given(owned_nets(), st.data())
@@ -219,6 +262,7 @@ def test_arbiters_over_layers_decide_as_in_one_layer() -> None:
     decomposition = split(net)
     group = next(group for group in decomposition.groups if group.name == "robot")
     assert (group.sequence, group.at, group.controller) == (("unload_a", "load_a"), None, None)
+    assert prove(decomposition).holds
 
 
 def test_a_run_of_layers_says_what_each_has_decided(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
