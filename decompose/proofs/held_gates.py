@@ -22,7 +22,7 @@ is needed from the moment its own part is firable, and the others may take long.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from threading import Event
 
@@ -36,13 +36,14 @@ from firable.nets.machines.closing import close
 from firable.nets.machines.loop import ClosedLoop, Sending
 from firable.nets.machines.plant_file import PlantModel
 from firable.nets.net import ExternalGate, Net, SignalKind, Transition
-from firable.nets.verdict import Status, Verdict, Witness
+from firable.nets.verdict import Verdict, Witness
 from firable.semantics.player import Player
 
 COMPLETIONS = "o4.completions"
 COMMANDS = "o4.commands"
 EVIDENCE = "o4.evidence.json"
 _HINT = "put the interlock into the machine's own controller, or make the signal one that a command clears"
+_COMPLETION_HINT = "let each command that clears it have a completion of its own"
 _BARE_HINT = "let the controller that reads '{}' give a token to '{}': without one it may have voted long before"
 _OUTSIDE_HINT = (
     "read '{}' in a transition of its own controller, and let '{}' take the token that this leaves: it remembers it"
@@ -96,24 +97,22 @@ def held_gates(
         said = _HINT if part.inputs else _BARE_HINT
         hint = (_OUTSIDE_HINT if outside else said).format(one.signal, one.transition)
         families.append(Family(name_of(one), str(one), {one.signal: asked}, hint=hint))
-    completions = [
-        Assumption(row.name, gate.signal, gate.wanted)
+    completions = {
+        f"{gate.signal} for {row.name}": Assumption(row.name, gate.signal, gate.wanted)
         for row in decomposition.coordinated
         if decomposition.net.transition(row.name).openable
         for gate in decomposition.net.transition(row.name).external
         if _is_completion(decomposition.net, gate)
-    ]
+    }
     families.append(
         Family(
             COMPLETIONS,
             "a completion that a coordinated transition waits for stays from the vote until it fires",
             {
-                f"{one.signal} for {one.transition}": never(
-                    f"o4.completion.{i}", _closed_after_vote(loop, decomposition, rows[one.transition], one)
-                )
-                for i, one in enumerate(completions)
+                about: never(f"o4.completion.{i}", _closed_after_vote(loop, decomposition, rows[one.transition], one))
+                for i, (about, one) in enumerate(completions.items())
             },
-            hint=_HINT,
+            hint=_COMPLETION_HINT,
         )
     )
     families.append(
@@ -125,8 +124,8 @@ def held_gates(
         )
     )
     answered = answers(loop, families, budget, interrupted=interrupted)
-    every = [(one,) for one in assumptions(decomposition)] + [tuple(completions), ()]
-    shown = (_shown(loop, decomposition, verdict, ones) for verdict, ones in zip(answered.verdicts, every, strict=True))
+    gates = [*({one.signal: one} for one in assumptions(decomposition)), completions, {}]
+    shown = (_shown(loop, decomposition, verdict, its) for verdict, its in zip(answered.verdicts, gates, strict=True))
     return HeldGates(tuple(shown), answered)
 
 
@@ -167,23 +166,19 @@ def _closed_after_vote(loop: ClosedLoop, decomposition: Decomposition, row: Coor
     return And((_vote(loop, decomposition.net, part, one), any_of(map(Firable, _closing(loop, one)))))
 
 
-def _shown(loop: ClosedLoop, decomposition: Decomposition, verdict: Verdict, ones: tuple[Assumption, ...]) -> Verdict:
-    """The verdict with the run led on by the firing that closes the gate."""
-    if verdict.status is not Status.VIOLATED or verdict.witness is None:
-        return replace(verdict, subjects=())
-    if not ones:
+def _shown(
+    loop: ClosedLoop, decomposition: Decomposition, verdict: Verdict, gates: Mapping[str, Assumption]
+) -> Verdict:
+    """The verdict, and where it is that one of the gates closes, with the run led on by the firing that closes it."""
+    if verdict.witness is None or not gates:
         return verdict
     rows = {row.name: row for row in decomposition.coordinated}
+    one = gates[verdict.subjects[0]]
+    part = _part(decomposition, rows[one.transition], decomposition.net.signal(one.signal).owner)
     player, marking = Player(loop.net), loop.net.marking(verdict.witness.marking)
     may_fire = {loop.net.transitions[t].name: t for t in player.firable(marking)}
-    for one in ones:
-        if len(ones) > 1 and f"{one.signal} for {one.transition}" not in verdict.subjects[:1]:
-            continue
-        part = _part(decomposition, rows[one.transition], decomposition.net.signal(one.signal).owner)
-        for name in _closing(loop, one):
-            if name in may_fire:
-                after = player.fire(marking, [may_fire[name]])
-                note = f"'{part.name}' had voted yes, and the last firing makes '{one.signal}' {int(not one.wanted)}"
-                firings = (*verdict.witness.firings, (name,))
-                return replace(verdict, witness=Witness(firings, marking=loop.net.names(after), note=note))
-    raise RuntimeError(f"the run of '{verdict.name}' ends where nothing closes the gate")
+    closing = next(name for name in _closing(loop, one) if name in may_fire)
+    after = player.fire(marking, [may_fire[closing]])
+    note = f"'{part.name}' had voted yes, and the last firing makes '{one.signal}' {int(not one.wanted)}"
+    firings = (*verdict.witness.firings, (closing,))
+    return replace(verdict, witness=Witness(firings, marking=loop.net.names(after), note=note))

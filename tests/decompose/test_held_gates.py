@@ -183,6 +183,79 @@ def test_the_gate_of_a_local_transition_that_the_coordinator_decides_is_asked_of
     assert broken.witness.firings[-2:] == (("a.door/drops",), ("a.door/told/falls",))
 
 
+def test_a_gate_of_a_part_that_waits_for_a_completion_to_be_cleared_is_asked_whatever_that_is() -> None:
+    """The part of `l` votes only before its command was ever sent."""
+    text = LOCAL_BESIDE_GLOBAL.replace("if: a.door}", "if: a.door, unless: a.out}").replace(
+        "to: a.p}\na", "to: a.q}\na"
+    )
+    flickering = parse_plant(ITS_MACHINE.replace("{occupied: entry}", "{occupied: entry, may_flicker: true}"))
+    verdicts = held_gates(split(parse_net(text)), flickering).verdicts
+    assert {verdict.name: verdict.status for verdict in verdicts[:2]} == {
+        "o4.l/a.door": Status.VIOLATED,
+        "o4.l/a.out": Status.PROVED,
+    }
+
+
+def test_a_controller_that_reads_a_gate_without_a_token_is_told_to_have_one() -> None:
+    text = (
+        LOCAL_BESIDE_GLOBAL.replace("    inputs: door\n", "")
+        .replace("if: a.door", "")
+        .replace("\ntransitions:", "\n  c: {inputs: door}\ntransitions:")
+    )
+    net = parse_net(text.replace("to: [a.q, sys.s2]}", "to: [a.q, sys.s2], if: c.door}"))
+    asked = held_gates(split(net), parse_plant(ITS_MACHINE.replace("a.door", "c.door"))).verdicts[0]
+    assert (asked.name, asked.status) == ("o4.g/c.door", Status.VIOLATED)
+    assert asked.hint.startswith("let the controller that reads 'c.door' give a token to 'g'")
+
+
+ONE_COMPLETION_OF_TWO = """\
+firable: 1
+cell: shared
+controllers:
+  sys: {coordinator: true, start: [s, k], places: {s: , s2: , k: , k2: }}
+  a:
+    start: [p, q]
+    places:
+      p:
+      q:
+      run:   {send: {machine: A, command: RUN}, until: out}
+      again: {send: {machine: A, command: RUN}, until: out}
+  b:
+    start: idle
+    places: {idle: , turn: {send: {machine: B, command: TURN}, until: turned}}
+transitions:
+  begin: {from: b.idle, to: b.turn}
+  turned: {from: [b.turn, sys.k], to: [b.idle, sys.k2]}
+  next: {from: sys.k2, to: sys.k}
+  start: {from: a.p, to: a.run}
+  ended: {from: [a.run, sys.s], to: [a.p, sys.s2]}
+  back: {from: sys.s2, to: sys.s}
+  other: {from: a.q, to: a.again}
+  done: {from: [a.again, sys.s2], to: [a.q, sys.s]}
+"""
+WORKING = """\
+firable_plant: 1
+plant: shared
+stations: [entry]
+arrivals:   {station: entry, every_s: 8}
+departures: {station: entry}
+machines:
+  A: {commands: {RUN: {does: work, takes_s: 1}}}
+  B: {commands: {TURN: {does: work, takes_s: 1}}}
+"""
+
+
+def test_a_completion_that_another_command_clears_while_its_part_has_voted_is_found() -> None:
+    held = held_gates(split(parse_net(ONE_COMPLETION_OF_TWO)), parse_plant(WORKING))
+    completions = held.verdicts[0]
+    assert (completions.name, completions.status) == (COMPLETIONS, Status.VIOLATED)
+    assert completions.subjects == ("a.out for ended", "a.out for done"), "nothing clears b.turned but what comes after"
+    assert completions.hint == "let each command that clears it have a completion of its own"
+    assert completions.witness is not None
+    assert completions.witness.note.startswith("'t1-21' had voted yes, and the last firing makes 'a.out' 0")
+    assert completions.witness.firings[-1][0].startswith("sent/a.again")
+
+
 def test_nothing_is_asked_of_a_transition_that_wants_a_signal_both_1_and_0_for_which_nobody_votes() -> None:
     both = "\n  never: {from: sys.s, to: sys.s2, if: [a.light, a.out], unless: [a.light, a.out]}"
     text = LOCAL_BESIDE_GLOBAL.replace("inputs: door", "inputs: [door, light]").replace(
@@ -297,6 +370,7 @@ def test_a_command_that_overtakes_that_of_another_controller_is_found_though_at_
     assert late.status is Status.VIOLATED
     assert late.witness is not None
     assert late.witness.note == "B is given WAIT while it is at another command"
+    assert late.hint == "let a completion of the one machine gate the command to the other"
     assert ("hand_over",) in late.witness.firings
     assert ("sent/c.stops/stops-c.runs",) not in late.witness.firings
 
@@ -314,10 +388,13 @@ def test_in_two_cells_a_robot_that_does_not_wait_meets_the_workpiece_that_a_late
     assert found == [(True, False), (True, False), (True, True)]
 
 
-def test_the_verdicts_leave_evidence_that_the_checker_confirms() -> None:
+def test_the_verdicts_leave_evidence_that_the_checker_confirms(monkeypatch: pytest.MonkeyPatch) -> None:
     net = catalogue_net("one_robot")
     held = held_gates(split(net), catalogue_plant("one_robot"))
-    (text,) = held.evidence().values()
+    ((file, text),) = held.evidence().items()
+    assert file == "o4.evidence.json"
+    monkeypatch.setattr("firable.analysis.evidence.document.PLAIN_BYTES_MAX", 0)
+    assert list(held.evidence()) == ["o4.evidence.json.gz"]
     checked = list(check_document(document_from_text(text.decode())))
     asked = ["o4.G1/conveyor.part_at_entry", "o4.G4/mc.part_present", "o4.completion.0"]
     assert [one.record.name for one in checked][:3] == [f"property.{name}" for name in asked]
