@@ -7,7 +7,7 @@ what was not; here every one of the nine has a line, whether a family proves it 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -58,13 +58,9 @@ class Standing:
     status: str
     by: str
 
-    def __str__(self) -> str:
-        return f"{self.name} {self.says}: {self.status}, {self.by}"
 
-
-def standing(decomposition: Decomposition, verdicts: Iterable[Verdict]) -> Iterator[Standing]:
+def standing(decomposition: Decomposition, given: Sequence[Verdict]) -> Iterator[Standing]:
     """The line of each of O1-O9, for the verdicts on a decomposition."""
-    given = list(verdicts)
     for name, says in SAYS.items():
         families = [family for family in FAMILIES if name in family.serves and proved_of(family, given)]
         if name == "O4" and (held := [verdict for verdict in given if verdict.name.startswith("o4.")]):
@@ -87,16 +83,14 @@ def standing(decomposition: Decomposition, verdicts: Iterable[Verdict]) -> Itera
         yield Standing(name, says, " and ".join(kinds) if found is Status.PROVED else found.value, by)
 
 
-def _doubted(decomposition: Decomposition, given: Iterable[Verdict]) -> Iterator[str]:
+def _doubted(decomposition: Decomposition, given: Sequence[Verdict]) -> Iterator[str]:
     """The titles of the families that stand in for what the protocol proof assumes, as far as they are not proved."""
-    verdicts = list(given)
-    held = {verdict.name for verdict in verdicts if verdict.holds}
-    held -= {verdict.name for verdict in verdicts if not verdict.holds}
+    held = {verdict.name for verdict in given} - {verdict.name for verdict in given if not verdict.holds}
     demanded = [name for name in required_verdicts(decomposition) if name not in held]
     for family in FAMILIES:
         if family.name in ASSUMED_BY_THE_PROTOCOL and any(name.partition(".")[0] == family.name for name in demanded):
             yield family.title
-    if not all(verdict.holds for verdict in proved_of(SIDE_CONDITIONS, verdicts)):
+    if not all(verdict.holds for verdict in proved_of(SIDE_CONDITIONS, given)):
         yield SIDE_CONDITIONS.title
 
 

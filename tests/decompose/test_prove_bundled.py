@@ -1,6 +1,6 @@
 """What is proved of a split goes into a bundle with its evidence, and nothing else does."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,13 +17,14 @@ from firable.cli.main import main
 from firable.decompose.bundling import make_bundle
 from firable.decompose.proofs.families import FAMILIES
 from firable.decompose.proofs.proving import prove
-from firable.decompose.proofs.standing import ASSUMED_BY_THE_PROTOCOL, standing
+from firable.decompose.proofs.standing import standing
 from firable.decompose.protocol.parametric.side_conditions import side_conditions
 from firable.decompose.splitting.cut import split
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_names, catalogue_net
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError
+from firable.nets.net import Controller, ExternalGate, Net, Place, Signal, Transition
 from firable.nets.queries import Query
 from firable.nets.right_to_run import required_verdicts, unproved
 from firable.nets.verdict import Status, Verdict, Weight
@@ -64,15 +65,65 @@ def test_net_with_anything_unproved_is_not_bundled() -> None:
     assert {file for verdict in bundle.verdicts for file in verdict.evidence} == set(bundle.evidence)
 
 
-def protocol_lines(decomposition: Decomposition, verdicts: Iterable[Verdict]) -> list[tuple[str, str]]:
-    return [(one.status, one.by) for one in standing(decomposition, verdicts) if one.name in {"O1", "O5"}]
+def lines(decomposition: Decomposition, verdicts: Sequence[Verdict]) -> dict[str, tuple[str, str]]:
+    return {one.name: (one.status, one.by) for one in standing(decomposition, verdicts)}
+
+
+def protocol_lines(decomposition: Decomposition, verdicts: Sequence[Verdict]) -> list[tuple[str, str]]:
+    return [line for name, line in lines(decomposition, verdicts).items() if name in {"O1", "O5"}]
+
+
+LEVELS = "of the cell; completion signals are levels, which their command clears"
+NOT_PROVED = {
+    "O1": ("assumed", "of the protocol"),
+    "O2": ("unknown", "no verdict is on it"),
+    "O3": ("unknown", "no verdict is on it"),
+    "O4": ("assumed", f"{LEVELS}; and 2 more, each of them listed"),
+    "O5": ("assumed", "of the protocol"),
+    "O6": ("assumed", "of the hosts and their storage"),
+    "O7": ("assumed", "of the executor, which sends a command in the act of applying"),
+    "O8": ("nothing to show", "there is one layer: no coordinator is under another one"),
+    "O9": ("not claimed", "what is proved is the equivalence of interleaving"),
+}
+PROVED = {
+    "O1": ("by the protocol proof", "protocol"),
+    "O2": ("proved statically", "O2, arbitration"),
+    "O3": ("proved statically", "O3, ownership"),
+    "O5": ("by the protocol proof", "protocol"),
+}
+
+
+def test_each_of_the_nine_obligations_has_a_line_whether_it_is_proved_or_not() -> None:
+    decomposition = split(catalogue_net("one_robot"))
+    verdicts = prove(decomposition).verdicts
+    assert lines(decomposition, ()) == NOT_PROVED
+    assert lines(decomposition, verdicts) == NOT_PROVED | PROVED
+    by_machines = (*verdicts, Verdict("o4.commands", Status.PROVED, "it is so", "the loop"))
+    shown = {"O4": ("shown in the loop", "with the machines that were given")}
+    assert lines(decomposition, by_machines) == NOT_PROVED | PROVED | shown
+    two_cells = split(catalogue_net("two_cells"))
+    assert lines(two_cells, prove(two_cells).verdicts)["O8"] == ("proved statically", "O8, O8 promises")
+
+
+@pytest.mark.parametrize(
+    ("gates", "more"), [((), ""), ((ExternalGate("b.s"),), "; and one more, which is listed")], ids=["none", "one"]
+)
+def test_gates_that_must_stay_open_are_counted_beside_completions(gates: tuple[ExternalGate, ...], more: str) -> None:
+    reads = Transition("t", ("a.p",), ("b.p",), external=gates)
+    places, signals = (Place("a.p", "a", marked=True), Place("b.p", "b")), (Signal("b.s", "b"),)
+    net = Net("gate", places, (reads,), signals, (Controller("a"), Controller("b")))
+    assert lines(split(net), ())["O4"] == ("assumed", LEVELS + more)
+
+
+ASSUMED = ("ownership", "o3", "eq7", "eq8", "eq9-10", "initial-marking", "commands", "arbitration")
+"""Of these the theorem on the protocol says that they must be proved of a split."""
 
 
 def test_protocol_proof_says_of_a_split_what_it_says_where_all_that_it_assumes_is_proved() -> None:
     decomposition = split(catalogue_net("conceptual_one_robot"))
     verdicts = prove(decomposition).verdicts
     assert protocol_lines(decomposition, verdicts) == [("by the protocol proof", "protocol")] * 2
-    for family in ASSUMED_BY_THE_PROTOCOL:
+    for family in ASSUMED:
         (title,) = (one.title for one in FAMILIES if one.name == family)
         one = next(v for v in verdicts if v.name.partition(".")[0] == family)
         others = tuple(v for v in verdicts if v != one)
@@ -93,6 +144,13 @@ def test_protocol_proof_says_of_a_split_what_it_says_where_all_that_it_assumes_i
     assert protocol_lines(decomposition, twice) == [("unknown", doubted)] * 2, "proved and violated is not proved"
     broken = (replace(v, status=Status.VIOLATED) if v.name.startswith("protocol.") else v for v in verdicts)
     assert protocol_lines(decomposition, [v for v in broken if v is not owned]) == [("violated", doubted)] * 2
+
+
+def test_what_serves_no_obligation_of_a_split_leaves_all_but_those_of_the_protocol_as_they_are() -> None:
+    decomposition = split(catalogue_net("one_robot"))
+    without = [v for v in prove(decomposition).verdicts if v.name != "commands"]
+    doubted = ("unknown", "protocol, which assumes of the split what is not proved here: commands")
+    assert lines(decomposition, without) == NOT_PROVED | PROVED | dict.fromkeys(("O1", "O5"), doubted)
 
 
 def test_each_obligation_is_violated_where_a_family_that_serves_it_has_a_verdict_that_is() -> None:
