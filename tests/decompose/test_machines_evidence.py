@@ -461,6 +461,7 @@ def test_no_bundle_is_made_of_a_loop_too_large_to_be_compared(monkeypatch: pytes
         make_bundle(check(catalogue_net("one_robot")), plant=plant())
     (problem,) = refusal.value.diagnostics
     assert (problem.code, problem.subject) == ("F4003", ("transitions", "G2"))
+    assert problem.hint.startswith("do less in one firing")
 
 
 def test_the_machines_of_another_cell_are_refused() -> None:
