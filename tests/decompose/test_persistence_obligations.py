@@ -29,7 +29,7 @@ from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net, family_net
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError
-from firable.nets.net import Controller, Net, Place, Transition
+from firable.nets.net import Command, Controller, ExternalGate, Net, Place, Signal, SignalKind, Transition
 from firable.nets.verdict import Status, Verdict, Weight
 from firable.semantics.player import Player
 
@@ -193,6 +193,40 @@ def test_a_unit_that_m0_does_not_keep_is_refuted() -> None:
     assert unit not in units_in_use(decomposition.net, votes(decomposition))
     bundle = proved(decomposition, forged(unit))
     assert bundle.verdicts[0].status is Status.VIOLATED
+
+
+def taken_while_it_is_0(kind: SignalKind, *, wanted: bool) -> Net:
+    """`G` waits for a signal of `a`, and `l` takes its token of `a` while that signal is 0."""
+    command, completion = Command("M", "RUN"), "a.s" if kind is SignalKind.COMPLETION else None
+    places = (
+        *(Place("a.p", "a", marked=True), Place("a.x", "a")),
+        *(Place("a.run", "a", command=command, completion=completion), Place("b.q", "b", marked=True)),
+    )
+    transitions = (
+        Transition("G", ("a.p", "b.q"), external=(ExternalGate("a.s", wanted),)),
+        Transition("l", ("a.p",), ("a.x",), external=(ExternalGate("a.s", wanted=False),)),
+        Transition("run", ("a.x",), ("a.run",), inhibitive=("a.p",)),
+        Transition("ran", ("a.run",), ("a.p",), external=(ExternalGate("a.s"),)),
+    )
+    return Net("n", places, transitions, (Signal("a.s", "a", kind),), (Controller("a"), Controller("b")))
+
+
+@pytest.mark.parametrize(
+    ("kind", "wanted", "status"),
+    [
+        (SignalKind.COMPLETION, True, Status.PROVED),
+        (SignalKind.COMPLETION, False, Status.VIOLATED),
+        (SignalKind.SENSOR, True, Status.VIOLATED),
+    ],
+)
+def test_only_what_a_command_alone_clears_and_a_part_awaits_keeps_off_who_waits_for_its_end(
+    kind: SignalKind, wanted: bool, status: Status
+) -> None:
+    decomposition = split(taken_while_it_is_0(kind, wanted=wanted))
+    cast = votes(decomposition)
+    assert {vote.part: vote.settled for vote in cast}["t1-11"] is (status is Status.PROVED)
+    claimed = tuple(replace(vote, falsifiers=()) for vote in cast)
+    assert {v.name: v.status for v in proved(decomposition, claimed).verdicts}["persistent.t1-11"] is status
 
 
 def test_what_rests_on_a_unit_that_the_solver_gave_up_is_only_claimed() -> None:
