@@ -25,8 +25,9 @@ import errno
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NoReturn
 from zlib import crc32
@@ -46,6 +47,47 @@ Input = tuple[float, str, tuple[str | int, ...]]
 """When, what, and with which arguments."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Past:
+    """What a log holds: its inputs, the check value at the beginning and behind each, and how many bytes are whole."""
+
+    inputs: tuple[Input, ...]
+    checks: tuple[int, ...]
+    size_bytes: int
+
+    @classmethod
+    def of(cls, path: Path, data: bytes, head: Mapping[str, object]) -> _Past:
+        """Read a log, which is to have this first line; raises `InputError` F5035."""
+        whole = data[: data.rfind(b"\n") + 1]
+        first, *lines = whole.decode("utf-8", "replace").splitlines() or [""]
+        is_begun = not first and json.dumps(head).encode().startswith(data)
+        if not is_begun and first != json.dumps(head):
+            if (its := _format_of(first)) not in {None, VERSION}:
+                _refuse(path, f"it has format {its}, and this firable writes {VERSION}")
+            of = f"{head['workpieces']} workpieces with the seed {head['seed']} in this plant '{head['plant']}'"
+            _refuse(path, f"it is not of {of}")
+        inputs, checks = [], [0]
+        for line in lines:
+            try:
+                *told, check = json.loads(line)
+                at_seconds, what, *arguments = told
+                if check != _check_of(told, checks[-1]):
+                    raise ValueError("another check value")
+                inputs.append((float(at_seconds), str(what), tuple(arguments)))
+                checks.append(check)
+            except (ValueError, TypeError, RecursionError):
+                _refuse(path, f"'{printable(line[:60])}' is no line of it, or does not follow on the one before")
+        return cls(tuple(inputs), tuple(checks), len(whole))
+
+
+def look_at_log(path: Path | str, plant: PlantModel, workpieces: int, seed: int) -> None:
+    """Refuse what stands there where `CellLog` would, by the same codes, and change nothing; there may be nothing."""
+    path = Path(path)
+    with _failures(path), suppress(FileNotFoundError, NotADirectoryError):
+        os.close(os.open(path, os.O_RDWR | os.O_CLOEXEC))
+        _Past.of(path, path.read_bytes(), _head(plant, workpieces, seed))
+
+
 class CellLog:
     """The log in a file, made if there is none; `past` is what it held. Close it with `close`.
 
@@ -54,39 +96,22 @@ class CellLog:
 
     def __init__(self, path: Path | str, plant: PlantModel, workpieces: int, seed: int) -> None:
         self.path = Path(path)
-        self.check = 0
-        """Over all lines so far, the header aside."""
-        digest = hashlib.sha256(plant.model_dump_json(exclude_defaults=True).encode()).hexdigest()
-        head = {
-            "firable_cell": VERSION,
-            "plant": plant.plant,
-            "digest": digest,
-            "workpieces": workpieces,
-            "seed": seed,
-        }
-        with self._failures():
+        head = _head(plant, workpieces, seed)
+        with _failures(self.path):
             self.descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o600)
         try:
-            with self._failures():
+            with _failures(self.path):
                 data = self.path.read_bytes()
-            whole = data[: data.rfind(b"\n") + 1]
-            first, *lines = whole.decode("utf-8", "replace").splitlines() or [""]
-            self.is_new = not first
+            found = _Past.of(self.path, data, head)
+            self.is_new = not found.size_bytes
             """Whether nothing was there: then no process has ever simulated this cell."""
-            is_begun = self.is_new and json.dumps(head).encode().startswith(data)
-            if not is_begun and first != json.dumps(head):
-                if (its := _format_of(first)) not in {None, VERSION}:
-                    self._refuse(f"it has format {its}, and this firable writes {VERSION}")
-                self._refuse(f"it is not of {workpieces} workpieces with the seed {seed} in this plant '{plant.plant}'")
-            past, checks = [], [self.check]
-            for line in lines:
-                past.append(self._input(line))
-                checks.append(self.check)
-            self.past: tuple[Input, ...] = tuple(past)
-            self.past_checks = tuple(checks)
-            self.count = len(past)
-            with self._failures():
-                os.truncate(self.descriptor, len(whole))  # now that it is known to be ours
+            self.past = found.inputs
+            self.past_checks = found.checks
+            self.count = len(self.past)
+            self.check = self.past_checks[-1]
+            """Over all lines so far, the header aside."""
+            with _failures(self.path):
+                os.truncate(self.descriptor, found.size_bytes)  # now that it is known to be ours
             if self.is_new:
                 self._write(head)
         except BaseException:
@@ -107,14 +132,14 @@ class CellLog:
         """Refuse (F5035) a log that has not been where this mark was made."""
         count, check = mark
         if not isinstance(count, int) or count >= len(self.past_checks):
-            self._refuse(f"it has {len(self.past)} of the {count} inputs that it had when {_WRITTEN}", PUT_BACK)
+            _refuse(self.path, f"it has {len(self.past)} of the {count} inputs that it had when {_WRITTEN}", PUT_BACK)
         if self.past_checks[count] != check:
-            self._refuse(f"its first {count} inputs are not those that it had when {_WRITTEN}", PUT_BACK)
+            _refuse(self.path, f"its first {count} inputs are not those that it had when {_WRITTEN}", PUT_BACK)
 
     def add(self, at_seconds: float, what: str, *arguments: str | int) -> None:
         """Write an input, before it has its effect."""
         whole = [at_seconds, what, *arguments]
-        check = self._check_of(whole)
+        check = _check_of(whole, self.check)
         self._write([*whole, check])
         self.count, self.check = self.count + 1, check  # what was not written whole is none
 
@@ -123,42 +148,45 @@ class CellLog:
         os.close(self.descriptor)
 
     def _write(self, line: Any) -> None:
-        with self._failures():
+        with _failures(self.path):
             # One call, so that a process which is killed has written the line or has not begun the next. Where that has
             # written a part only, the disk is full, and the next one says so.
             rest = (json.dumps(line) + "\n").encode()
             while rest:
                 rest = rest[os.write(self.descriptor, rest) :]
 
-    def _input(self, line: str) -> Input:
-        try:
-            *whole, check = json.loads(line)
-            at_seconds, what, *arguments = whole
-            if check != self._check_of(whole):
-                raise ValueError("another check value")
-            self.check = check
-            return float(at_seconds), str(what), tuple(arguments)
-        except (ValueError, TypeError, RecursionError):
-            self._refuse(f"'{printable(line[:60])}' is no line of it, or does not follow on the one before")
 
-    def _check_of(self, item: list[Any]) -> int:
-        """The check value that the next line has."""
-        return crc32(json.dumps(item).encode(), self.check)
+def _head(plant: PlantModel, workpieces: int, seed: int) -> dict[str, object]:
+    """The first line of a log."""
+    return {
+        "firable_cell": VERSION,
+        "plant": plant.plant,
+        "digest": hashlib.sha256(plant.model_dump_json(exclude_defaults=True).encode()).hexdigest(),
+        "workpieces": workpieces,
+        "seed": seed,
+    }
 
-    def _refuse(self, why: str, hint: str = "run it as it was begun, or name another journal") -> NoReturn:
-        message = f"{printable(str(self.path))}: not the simulated cell of this run: {why}"
-        raise InputError([Diagnostic("F5035", message, hint)]) from None
 
-    @contextmanager
-    def _failures(self) -> Iterator[None]:
-        try:
-            yield
-        except OSError as error:
-            message = f"{printable(str(self.path))}: the simulated cell cannot be kept: {error.strerror}"
-            hint = "name a folder that you may write to"
-            if error.errno in {errno.ENOSPC, errno.EDQUOT}:
-                hint = "make room on its disk; the same command then takes the run up"
-            raise InputError([Diagnostic("F5034", message, hint)]) from None
+def _check_of(item: list[Any], before: int) -> int:
+    """The check value of a line behind one with another."""
+    return crc32(json.dumps(item).encode(), before)
+
+
+def _refuse(path: Path, why: str, hint: str = "run it as it was begun, or name another journal") -> NoReturn:
+    message = f"{printable(str(path))}: not the simulated cell of this run: {why}"
+    raise InputError([Diagnostic("F5035", message, hint)]) from None
+
+
+@contextmanager
+def _failures(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        message = f"{printable(str(path))}: the simulated cell cannot be kept: {error.strerror}"
+        hint = "name a folder that you may write to"
+        if error.errno in {errno.ENOSPC, errno.EDQUOT}:
+            hint = "make room on its disk; the same command then takes the run up"
+        raise InputError([Diagnostic("F5034", message, hint)]) from None
 
 
 def _format_of(first: str) -> int | None:

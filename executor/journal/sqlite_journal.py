@@ -72,12 +72,8 @@ class SqliteJournal:
         """The generation that is durable: behind `generation` while a sync is under way."""
         self.failed: InputError | None = None
         self.witness_descriptor = -1
+        is_new = is_to_be_made(self.path)
         with _failures(self.path, "opened"):
-            refuse_taken_over(self.path)
-            told = self._durable()  # before the journal, which another process makes before it writes a number there
-            is_new = not self.path.exists() or not self.path.stat().st_size
-            if is_new and told:  # and nothing is made there
-                _damaged(self.path, self._gone, is_alone=True)
             # One thread at a time uses it, and not always the same.
             self.connection = sqlite3.connect(self.path, timeout=0, isolation_level=None, check_same_thread=False)
         try:
@@ -159,7 +155,7 @@ class SqliteJournal:
         run("begin exclusive")
         refuse_taken_over(self.path)  # it may have been while this waited
         tables = {name for (name,) in run("select name from sqlite_master where type = 'table'")}
-        if not tables and self._durable() == "":  # it was being made, if not now
+        if not tables and _durable(self.path) == "":  # it was being made, if not now
             for statement in filter(str.strip, _SCHEMA.split(";")):
                 run(statement)
             header = (FORMAT, digest, json.dumps(self.machines), 0, 0)
@@ -183,7 +179,7 @@ class SqliteJournal:
         if problems:
             _damaged(self.path, problems[0])
         if not run("select count(*) from sqlite_master").fetchone()[0]:
-            _damaged(self.path, self._gone if self.witness.exists() else _NOTHING, is_alone=True)
+            _damaged(self.path, _gone(self.path) if self.witness.exists() else _NOTHING, is_alone=True)
         headers = run("select format, digest, machines, generation, total from header").fetchall()
         if len(headers) != 1 or not isinstance(headers[0][3], int):
             _damaged(self.path, "its header is missing")
@@ -199,7 +195,7 @@ class SqliteJournal:
         self.total = sum(self.checks.values())
         if self.total != total:
             _damaged(self.path, "rows are missing, or are older than the others")
-        durable = self._durable()
+        durable = _durable(self.path)
         if durable == "" and not self.generation:  # the process ended when all was made, and nothing stored
             return
         if not durable or not durable.isdigit():
@@ -209,14 +205,6 @@ class SqliteJournal:
             _damaged(
                 self.path, f"it has lost what was stored: it is at sync {self.generation}, and {int(durable)} were done"
             )
-
-    @property
-    def _gone(self) -> str:
-        return f"it is gone or empty, and {printable(self.witness.name)} beside it tells of one"
-
-    def _durable(self) -> str | None:
-        """What the witness says, if it is there."""
-        return self.witness.read_text("ascii", "replace").strip() if self.witness.exists() else None
 
     def _bear_witness(self, generation: int) -> None:
         os.pwrite(self.witness_descriptor, f"{generation:020}\n".encode(), 0)
@@ -243,6 +231,32 @@ class SqliteJournal:
 def witness_of(path: Path | str) -> Path:
     """The file beside a journal that tells of its last sync."""
     return Path(f"{Path(path)}.generation")
+
+
+def is_to_be_made(path: Path | str) -> bool:
+    """Whether no journal is there yet, as far as that is seen without its lock; nothing is made by looking.
+
+    Raises `InputError` F5032 where one was there and is gone, F5034 where that cannot be seen, F5036 where a new bundle
+    goes on from it.
+    """
+    path = Path(path)
+    refuse_taken_over(path)
+    with _failures(path, "opened"):
+        told = _durable(path)  # before the journal, which another process makes before it writes a number there
+        is_new = not path.exists() or not path.stat().st_size
+        if is_new and told:
+            _damaged(path, _gone(path), is_alone=True)
+    return is_new
+
+
+def _durable(path: Path) -> str | None:
+    """What the witness of a journal says, if it is there."""
+    witness = witness_of(path)
+    return witness.read_text("ascii", "replace").strip() if witness.exists() else None
+
+
+def _gone(path: Path) -> str:
+    return f"it is gone or empty, and {printable(witness_of(path).name)} beside it tells of one"
 
 
 def mark_of(path: Path | str) -> Path:

@@ -133,20 +133,21 @@ def _failures(path: Path | str) -> Iterator[None]:
 
 
 def room_for(path: Path | str) -> AbstractContextManager[object]:
-    """Raise `InputError` F1017 where no trace can be, as far as that is seen without making one.
+    """Raise `InputError` F1017 where no trace can be; one that is made to see that is taken away at once.
 
     Be in what is returned until the trace is open: a pipe that is let go of before would have ended for its reader.
     """
     with _failures(path):
-        if Path(path).exists():
-            return closing(TraceFile(path))
-        if str(path).endswith("/"):
-            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
-        folder = Path(os.path.realpath(path)).parent
-        Path(folder, "..").stat()  # which no file has
-        if not os.access(folder, os.W_OK | os.X_OK, effective_ids=True):
-            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-    return nullcontext()
+        try:
+            Path(path).stat()
+        except FileNotFoundError:
+            if str(path).endswith("/"):
+                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR)) from None
+            made = os.path.realpath(path)  # a link that leads nowhere stays
+            os.close(os.open(made, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666))
+            Path(made).unlink()
+            return nullcontext()
+        return closing(TraceFile(path))
 
 
 TRACE: Final = "\ntrace"

@@ -20,9 +20,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
-from firable.executor.cell.cell_log import PUT_BACK, CellLog
+from firable.executor.cell.cell_log import PUT_BACK, CellLog, look_at_log
 from firable.executor.journal.journal import Journal, MemoryJournal
-from firable.executor.journal.sqlite_journal import SqliteJournal, is_written
+from firable.executor.journal.sqlite_journal import SqliteJournal, is_to_be_made
 from firable.executor.operating.recorder import (
     CELL,
     KEY,
@@ -95,10 +95,14 @@ def opened(
     """
     net = decomposition.net
     with ExitStack() as stack:
-        if isinstance(trace, Path | str):  # before a journal is made, which a run that is refused would leave there
+        # What is seen without its lock is looked at before a journal is made, which a refused run would leave there.
+        if isinstance(trace, Path | str):
             stack.enter_context(room_for(trace))
-            if journal_path is not None and not is_written(journal_path):
+        if journal_path is not None and is_to_be_made(journal_path):
+            if isinstance(trace, Path | str):
                 _demand_an_empty_one(trace, is_taken_over=False)
+            if simulated is not None:
+                look_at_log(_cell_of(journal_path), *simulated)
         journal: Journal = MemoryJournal()
         cell = None
         names = machines or (*coordinators(decomposition), *(subnet.name for subnet in decomposition.subnets))
@@ -115,7 +119,7 @@ def opened(
             elif journal_path is not None or simulated is None:
                 _demand_an_empty_one(trace, is_taken_over=is_taken_over)
         if journal_path is not None and simulated is not None:
-            cell = stack.enter_context(closing(CellLog(f"{journal_path}.cell", *simulated)))
+            cell = stack.enter_context(closing(CellLog(_cell_of(journal_path), *simulated)))
             if begun:
                 _demand_the_cell(cell, net, kept)
         if isinstance(trace, Path | str):
@@ -125,6 +129,11 @@ def opened(
         recorder = Recorder(net, net_digest(net), trace, kept, machines, now, start, cell)
         last = max(recorder.at_seconds, cell.end_seconds if cell is not None else 0.0, now - recorder.began)
         yield Files(journal, recorder, cell, last, begun, moved)
+
+
+def _cell_of(journal: Path | str) -> Path:
+    """The log of the simulated cell of a journal."""
+    return Path(f"{journal}.cell")
 
 
 def _demand_what_it_is_on(path: Path | str, journal: Journal, on: On, names: Collection[str]) -> None:

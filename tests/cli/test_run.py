@@ -223,9 +223,14 @@ def test_a_trace_whose_name_no_file_can_have_is_refused(bundle: str, capsys: pyt
     assert "error[F1017]" in capsys.readouterr().err
 
 
-def is_where_nobody_may_write(folder: Path) -> Path:
-    (folder / "traces").mkdir(mode=0o500)
-    return folder / "traces" / "trace"
+def is_where_no_file_can_be_made(_: Path) -> Path:
+    """Which is seen by whoever tries it alone: the folder says that one may write there."""
+    return Path("/proc/cell.trace")
+
+
+def is_a_link_to_itself(folder: Path) -> Path:
+    (folder / "trace").symlink_to("trace")
+    return folder / "trace"
 
 
 def has_lines(folder: Path) -> Path:
@@ -248,19 +253,17 @@ def is_a_pipe_that_nobody_reads(folder: Path) -> Path:
         (lambda folder: folder / "traces" / "trace", "No such file or directory"),
         (lambda folder: has_lines(folder) / "trace", "Not a directory"),
         (lambda folder: folder / ("n" * 300), "File name too long"),
-        (is_where_nobody_may_write, "Permission denied"),
+        (is_where_no_file_can_be_made, "the trace cannot be written"),
+        (is_a_link_to_itself, "Too many levels of symbolic links"),
     ],
 )
 def test_a_run_that_is_refused_for_its_trace_leaves_no_journal(
     bundle: str,
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
     trace_in: Callable[[Path], Path | str],
     reason: str,
 ) -> None:
-    if trace_in is is_where_nobody_may_write:  # whoever runs the tests may write anywhere
-        monkeypatch.setattr(os, "access", lambda *_, **__: False)
     trace = trace_in(tmp_path)
     before = set(tmp_path.iterdir())
     command = ["run", bundle, "--workpieces", "1", "--journal", str(tmp_path / "cell.journal"), "--trace", str(trace)]
@@ -269,6 +272,30 @@ def test_a_run_that_is_refused_for_its_trace_leaves_no_journal(
     assert said.startswith("error[F1017]")
     assert reason in said
     assert set(tmp_path.iterdir()) == before
+
+
+def test_a_run_that_is_refused_for_its_simulated_cell_leaves_nothing(
+    bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    journal, cell = tmp_path / "cell.journal", tmp_path / "cell.journal.cell"
+    command = ["run", bundle, "--workpieces", "1", "--journal", str(journal), "--trace", str(tmp_path / "trace")]
+    cell.mkdir()
+    assert main(command) == 2
+    assert f"error[F5034]: {cell}: the simulated cell cannot be kept: Is a directory" in capsys.readouterr().err
+    cell.rmdir()
+    cell.write_text("of another kind\n", "utf-8")
+    assert main(command) == 2
+    told = capsys.readouterr().err
+    assert told.startswith(f"error[F5035]: {cell}: not the simulated cell of this run"), "no journal is told to be new"
+    assert list(tmp_path.iterdir()) == [cell]
+    assert cell.read_text("utf-8") == "of another kind\n"
+
+
+def test_a_trace_is_begun_where_its_link_leads(bundle: str, tmp_path: Path) -> None:
+    (tmp_path / "trace").symlink_to("kept")
+    assert main(["run", bundle, "--workpieces", "1", "--trace", str(tmp_path / "trace")]) == 0
+    assert (tmp_path / "trace").is_symlink()
+    assert (tmp_path / "kept").stat().st_size
 
 
 def test_a_trace_does_not_go_to_standard_output(

@@ -16,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.examples import examples
 
+from firable.executor.journal import sqlite_journal
 from firable.executor.journal.journal import Journal, MemoryJournal, sync_now
 from firable.executor.journal.sqlite_journal import FORMAT, SqliteJournal, machines_of, mark_of, mark_text
 from firable.executor.protocol.messages import Firing, Keep, Stored
@@ -429,17 +430,17 @@ def test_a_journal_that_another_process_makes_meanwhile_is_in_use_and_not_damage
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made: list[SqliteJournal] = []
-    told = SqliteJournal._durable
+    told = sqlite_journal._durable
 
-    def makes(one: SqliteJournal) -> str | None:
+    def makes(path: Path) -> str | None:
         if not made:
             monkeypatch.undo()
             made.append(SqliteJournal(tmp_path / "cell.journal", "d1", ("a",)))
             made[0].write("a", [Keep("epoch", 1)])
             sync_now(made[0])
-        return told(one)
+        return told(path)
 
-    monkeypatch.setattr(SqliteJournal, "_durable", makes)
+    monkeypatch.setattr(sqlite_journal, "_durable", makes)
     with pytest.raises(InputError, match="F5033"):
         SqliteJournal(tmp_path / "cell.journal", "d1", ("a",))
     made[0].close()
