@@ -80,12 +80,13 @@ class _Past:
         return cls(tuple(inputs), tuple(checks), len(whole))
 
 
-def look_at_log(path: Path | str, plant: PlantModel, workpieces: int, seed: int) -> None:
-    """Refuse what stands there where `CellLog` would, by the same codes, and change nothing; there may be nothing."""
+def past_in(path: Path | str, plant: PlantModel, workpieces: int, seed: int) -> tuple[Input, ...]:
+    """What a log holds, if there is one; refused as by `CellLog`, and nothing is changed."""
     path = Path(path)
     with _failures(path), suppress(FileNotFoundError, NotADirectoryError):
         os.close(os.open(path, os.O_RDWR | os.O_CLOEXEC))
-        _Past.of(path, path.read_bytes(), _head(plant, workpieces, seed))
+        return _Past.of(path, path.read_bytes(), _head(plant, workpieces, seed)).inputs
+    return ()
 
 
 class CellLog:

@@ -12,7 +12,7 @@ where they were is for a person to say (`whereabouts.py`).
 from __future__ import annotations
 
 import time
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
 from enum import StrEnum
@@ -20,7 +20,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
-from firable.executor.cell.cell_log import PUT_BACK, CellLog, look_at_log
+from firable.executor.cell.cell_log import PUT_BACK, CellLog, Input, past_in
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.journal.sqlite_journal import SqliteJournal, is_to_be_made
 from firable.executor.operating.recorder import (
@@ -91,7 +91,7 @@ def opened(
     simulated cell are on, and `at` where each machine of a binding is.
 
     Raises `InputError` F5031-F5034 for a journal that cannot be gone on with, F5035 for a simulated cell of another
-    run, F1017 for a trace that cannot be written or does not go on where it was.
+    run, or of one whose journal is gone, F1017 for a trace that cannot be written or does not go on where it was.
     """
     net = decomposition.net
     with ExitStack() as stack:
@@ -102,7 +102,7 @@ def opened(
             if isinstance(trace, Path | str):
                 _demand_an_empty_one(trace, is_taken_over=False)
             if simulated is not None:
-                look_at_log(_cell_of(journal_path), *simulated)
+                _demand_an_unmoved_one(cell_of := _cell_of(journal_path), past_in(cell_of, *simulated))
         journal: Journal = MemoryJournal()
         cell = None
         names = machines or (*coordinators(decomposition), *(subnet.name for subnet in decomposition.subnets))
@@ -122,6 +122,8 @@ def opened(
             cell = stack.enter_context(closing(CellLog(_cell_of(journal_path), *simulated)))
             if begun:
                 _demand_the_cell(cell, net, kept)
+            else:
+                _demand_an_unmoved_one(cell.path, cell.past)
         if isinstance(trace, Path | str):
             trace = stack.enter_context(closing(TraceFile(trace, size_bytes_of(kept))))
         now = time.time() if machines else 0.0
@@ -197,7 +199,7 @@ def _demand_the_cell(cell: CellLog, net: Net, kept: Stored | None) -> None:
     """What the journal tells of was done to this simulated cell, by places that the net still has."""
     message = f"{printable(str(cell.path))}: the simulated cell of this journal is empty or gone"
     hint = PUT_BACK
-    sent = {str(arguments[0]) for _, what, arguments in cell.past if what == "send" and arguments}
+    sent = _sent(cell.past)
     if unknown := sorted(place for place in sent if place not in net.place_index):
         message = f"{printable(str(cell.path))}: the simulated cell was commanded by '{unknown[0]}', which is no place"
         hint = "a simulated cell is taken over only by a net that keeps the places which have commanded it"
@@ -206,6 +208,19 @@ def _demand_the_cell(cell: CellLog, net: Net, kept: Stored | None) -> None:
             cell.demand(mark)
         return
     raise InputError([Diagnostic("F5035", message, hint)])
+
+
+def _demand_an_unmoved_one(path: Path, past: Iterable[Input]) -> None:
+    """Whose journal has not begun was never commanded: a command leaves when the journal has it."""
+    if _sent(past):
+        message = f"{printable(str(path))}: the simulated cell was commanded by a run whose journal is gone"
+        hint = "put that journal back, or name another one: the machines of this cell are not at their beginning"
+        raise InputError([Diagnostic("F5035", message, hint)])
+
+
+def _sent(past: Iterable[Input]) -> set[str]:
+    """The places that have commanded a simulated cell."""
+    return {str(arguments[0]) for _, what, arguments in past if what == "send" and arguments}
 
 
 def start_of(decomposition: Decomposition, names: Collection[str], journal: Journal) -> Start:

@@ -25,10 +25,12 @@ from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.bench import until
 from firable.executor.drivers.simulated import SimulatedDriver
 from firable.executor.journal.journal import MemoryJournal
+from firable.executor.journal.sqlite_journal import SqliteJournal
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.running import Operator, RunReport
 from firable.executor.protocol.commands import Answer
+from firable.executor.protocol.deciders import coordinators
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.net import Place
 from firable.semantics.replaying import replay
@@ -196,6 +198,22 @@ def test_cell_of_other_workpieces_is_not_taken_up(tmp_path: Path) -> None:
 def test_journal_whose_cell_is_gone_is_not_taken_up(tmp_path: Path) -> None:
     run_here(tmp_path, seconds=5.0)
     (tmp_path / "cell.journal.cell").unlink()
+    assert refused(tmp_path)[0] == "F5035"
+
+
+def test_cell_whose_journal_is_gone_is_not_commanded_as_if_it_was_new(tmp_path: Path) -> None:
+    run_here(tmp_path, seconds=5.0)
+    (tmp_path / "cell.journal").unlink()
+    (tmp_path / "cell.journal.generation").unlink()
+    (tmp_path / "trace.jsonl").unlink()
+    assert refused(tmp_path) == (
+        "F5035",
+        f"{tmp_path}/cell.journal.cell: the simulated cell was commanded by a run whose journal is gone",
+    )
+    assert list(tmp_path.iterdir()) == [tmp_path / "cell.journal.cell"]
+    parts = decomposition_of("one_robot")
+    names = (*coordinators(parts), *(subnet.name for subnet in parts.subnets))
+    SqliteJournal(tmp_path / "cell.journal", "d", names).close()  # which a run leaves that has never begun
     assert refused(tmp_path)[0] == "F5035"
 
 
