@@ -22,10 +22,14 @@ from firable.cli.options import (
     page_option,
     with_page,
 )
+from firable.cli.progress import stages
 from firable.cli.refine import read_catalogue, tasks_option
 from firable.cli.report import Report
+from firable.cli.terminated import terminated_as_by_ctrl_c
 
 if TYPE_CHECKING:
+    from threading import Event
+
     from firable.analysis.spaces.reachability import Budget
     from firable.decompose.refinement.sealing import Origin
     from firable.nets.diagnostics import Diagnostic
@@ -73,13 +77,15 @@ def bundle(
     Each document of evidence, on NET and on each of its loops with machines, is looked for in --max-seconds, or 30; the
     loops are explored to the end.
     With --conceptual it holds the tasks, too, and the proof that opening them makes NET, and keeps what can be done.
+    Ctrl-C or SIGTERM ends what is being done, writes no bundle and shows what is known so far.
     """
     if output == "-":
         raise click.UsageError("a bundle cannot go to standard output, where the report goes: name a file")
     if files and conceptual is None:
         raise click.UsageError("--tasks goes with --conceptual, whose places name tasks")
     asked = _Asked(net, output, budget(**limits), machines, protocol, faults, conceptual, files)
-    return answer("bundle", format_, with_page(lambda: _telling(asked), page), _show)
+    with terminated_as_by_ctrl_c() as ended:
+        return answer("bundle", format_, with_page(lambda: _telling(asked, ended), page), _show)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,12 +102,12 @@ class _Asked:
     tasks: tuple[str, ...]
 
 
-def _telling(asked: _Asked) -> Report:
+def _telling(asked: _Asked, ended: Event) -> Report:
     """The report, which where no bundle was made tells of what stands in its place: a script would go on with that."""
     from firable.nets.diagnostics import Diagnostic, InputError, Severity
 
     try:
-        report = _report(asked)
+        report = _report(asked, ended)
     except InputError as error:
         if not (older := _older(asked.output)):
             raise
@@ -150,7 +156,7 @@ def _plant(asked: _Asked, net: Net) -> tuple[str, tuple[Diagnostic, ...]]:
     return text, late_limits(model, net)
 
 
-def _report(asked: _Asked) -> Report:
+def _report(asked: _Asked, ended: Event) -> Report:
     from firable.analysis.check import check
     from firable.analysis.deadline import Deadline
     from firable.analysis.goal import Limits
@@ -178,7 +184,13 @@ def _report(asked: _Asked) -> Report:
         return unmade
     seconds = SECONDS if allowed.seconds is None else allowed.seconds
     told = {verdict.name: verdict for verdict in found.verdicts}  # with all that the bundle has no evidence on
-    with loaded.placing():
+    with loaded.placing(), stages() as stage:
+
+        def begins(words: str) -> None:
+            if ended.is_set():
+                raise KeyboardInterrupt
+            stage(words)
+
         try:
             made = make_bundle(
                 found,
@@ -187,6 +199,7 @@ def _report(asked: _Asked) -> Report:
                 faults=asked.faults,
                 plant=plant,
                 origin=origin,
+                begins=begins,
             )
         except UnbundledError as refusal:
             verdicts = tuple(told.get(one.name) or _told(one, asked) for one in refusal.verdicts)

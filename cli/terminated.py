@@ -10,30 +10,39 @@ import os
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
-from threading import Thread, current_thread, main_thread
+from threading import Event, Thread, current_thread, main_thread
+from types import FrameType
 
 
 @contextmanager
-def terminated_as_by_ctrl_c() -> Iterator[None]:
-    """Let SIGTERM end what is done here as Ctrl-C does.
+def terminated_as_by_ctrl_c() -> Iterator[Event]:
+    """Let SIGTERM end what is done here as Ctrl-C does; what is given is set by then, whoever ends by it.
 
-    Where Ctrl-C is ignored, as in what a shell script begins with `&`, or SIGTERM means something already, it is left
-    as it is.
+    Where Ctrl-C means something else, as nothing in what a shell script begins with `&`, or SIGTERM does, both are left
+    as they are.
     """
-    is_ours = signal.getsignal(signal.SIGTERM) is signal.SIG_DFL and signal.getsignal(signal.SIGINT) != signal.SIG_IGN
-    if current_thread() is not main_thread() or not is_ours:
-        yield
+    ended = Event()
+    theirs = signal.getsignal(signal.SIGTERM), signal.getsignal(signal.SIGINT)
+    if current_thread() is not main_thread() or theirs != (signal.SIG_DFL, signal.default_int_handler):
+        yield ended
         return
+
+    def end(*_: int | FrameType | None) -> None:
+        ended.set()
+        raise KeyboardInterrupt
+
     heard, told = os.pipe()
     os.set_blocking(told, False)
     listener = Thread(target=_listen, args=(heard,), daemon=True)
     listener.start()
     before = signal.set_wakeup_fd(told)
     signal.signal(signal.SIGTERM, lambda *_: None)
+    signal.signal(signal.SIGINT, end)
     try:
-        yield
+        yield ended
     finally:
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         signal.set_wakeup_fd(before)
         os.close(told)
         listener.join()

@@ -11,11 +11,11 @@ on all of it goes along, so that the bundle can be checked again without anythin
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Final
 
-from firable.analysis.check import AGAIN
+from firable.analysis.check import AGAIN, INTERRUPTED
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.producing.lacking import NO_TIME, is_of_budget, is_of_size, what_to_allow
 from firable.analysis.evidence.producing.producer import evidence_of_report
@@ -67,6 +67,7 @@ def make_bundle(
     faults: bool = False,
     plant: str = "",
     origin: Origin | None = None,
+    begins: Callable[[str], object] = lambda _: None,
 ) -> Bundle:
     """Split the net of a report, prove the decomposition and bundle both with all verdicts and their evidence.
 
@@ -75,11 +76,13 @@ def make_bundle(
     `protocol` and `faults` the bundle holds the verdicts on the protocol of this very net, too, with the parts that are
     free of promise, proved by an invariant. With the text of a `plant` file it holds that file, that its machines keep
     what votes rely on (O4), that the cell does with them what it must, and what their faults lead to; with an `origin`,
-    the conceptual net and the tasks of which the net is made, and that it does what that one does.
+    the conceptual net and the tasks of which the net is made, and that it does what that one does. `begins` is told
+    what is done next. Ctrl-C ends it, and so does `begins` by raising `KeyboardInterrupt`: then nothing is made.
 
     Raises `InputError`: F4001 and F2011 where the net cannot be split; F4003 where the report is not that of exploring
     this net by interleaving, which is how it will be executed, and where the net is not made of its origin. For all
-    that must be proved and is not, or is not shown, it is an `UnbundledError` (F4003; F3004 where a budget ended).
+    that must be proved and is not, or is not shown, it is an `UnbundledError` (F4003; F3004 where a budget ended, and
+    where Ctrl-C has).
     """
     if report.net != report.space.net:
         message = f"the verdicts are on another net than '{report.net.name}'"
@@ -87,27 +90,81 @@ def make_bundle(
     if not report.discipline is report.space.discipline is Discipline.INTERLEAVING:
         message = "the verdicts are on another discipline than interleaving, by which the net is executed"
         raise InputError([Diagnostic("F4003", message, "check the net with the discipline interleaving")])
+    course = _Course(begins, [*report.verdicts])
+    families = ["explored"] * (protocol or faults) + ["faults"] * faults
+    try:
+        return _made(report, limits, course, timeout_ms, families, plant, origin)
+    except KeyboardInterrupt:
+        raise course.ended() from None
+
+
+@dataclass
+class _Course:
+    """What is being done, and the verdicts that are known by then."""
+
+    begins: Callable[[str], object]
+    known: list[Verdict]
+    doing: str = ""
+
+    def begin(self, doing: str) -> None:
+        self.doing = doing
+        self.begins(doing)
+
+    def ended(self) -> UnbundledError:
+        """What Ctrl-C has left."""
+        bound = f"{INTERRUPTED}: {self.doing}"
+        open_ = Verdict(
+            "bundle", Status.UNKNOWN, "all that the bundle must hold is proved", "nothing", bound=bound, hint=AGAIN
+        )
+        return UnbundledError([Diagnostic(_BUDGET, bound, AGAIN)], (*self.known, open_))
+
+
+def _made(
+    report: CheckReport,
+    limits: Limits | None,
+    course: _Course,
+    timeout_ms: int,
+    families: list[str],
+    plant: str,
+    origin: Origin | None,
+) -> Bundle:
     seconds = SECONDS if limits is None else limits.deadline.left_seconds
+    course.begin("votes")
     decomposition = split(report.net)
     cast = votes(decomposition, Deadline.after(UNITS_SECONDS))
-    proof = prove(decomposition, timeout_ms=timeout_ms, cast=cast)
+    proof = prove(decomposition, timeout_ms=timeout_ms, cast=cast, begins=course.begin)
+    course.known += proof.verdicts
+    if any(verdict.bound == INTERRUPTED for verdict in proof.verdicts):
+        raise KeyboardInterrupt  # which has ended the proof alone
+    course.begin("persistent votes")
     found = persistence(decomposition, report.space, cast=cast)
     voted, shown = found.with_evidence()
     voted = tuple(_as_shown(verdict, verdict.evidence, report.net) for verdict in voted)
     decomposition = replace(decomposition, free=found.free_as_shown(voted))
+    course.known += voted
+    course.begin("evidence on the net")
     document = evidence_of_report(report, (), _anew(limits, seconds))
     named = {record.name for record in document.records if not record.lacking}
     on_the_net = (_as_shown(v, (EVIDENCE,) if v.name in named else (), report.net) for v in report.verdicts)
-    families = ["explored"] * (protocol or faults) + ["faults"] * faults
+    course.begin("protocol")
     run, obligations = proved_without_exploring(decomposition, families, timeout_ms)
+    course.known += run
     dead, last_rites = tuple[Verdict, ...](), dict[str, str]()
-    if faults:
+    if "faults" in families:
+        course.begin("what goes on without the dead")
         dead, last_rites = sealed_outages(decomposition, lambda: _anew(limits, seconds), timeout_ms)
         dead = tuple(replace(v, bound=UNDECIDED) if v.status is Status.UNKNOWN else v for v in dead)
+        course.known += dead
     held, machines, unshown = tuple[Verdict, ...](), dict[str, str](), dict[str, str]()
     if plant:
+        course.begin("loop with the machines")
         held, machines, unshown = sealed_loops(decomposition, plant, lambda: _anew(limits, seconds))
-    refined, opened = sealed(report.net, origin, _anew(limits, seconds), timeout_ms) if origin else ((), {})
+        course.known += held
+    refined, opened = tuple[Verdict, ...](), dict[str, str]()
+    if origin is not None:
+        course.begin("refinement")
+        refined, opened = sealed(report.net, origin, _anew(limits, seconds), timeout_ms)
+    course.begin("seal")
     verdicts = (*on_the_net, *proof.verdicts, *run, *dead, *held, *voted, *refined)
     proofs = {**proof.files, **obligations, **last_rites}
     files = {EVIDENCE: document.to_text(), **proofs, **machines, **shown, **opened}

@@ -2,6 +2,7 @@
 
 import os
 import pty
+import re
 import signal
 import subprocess
 import sys
@@ -115,6 +116,54 @@ def test_sigterm_ends_a_solver_in_the_main_thread_and_is_itself_again_afterwards
 def test_sigterm_ends_at_once_what_takes_no_ctrl_c() -> None:
     done = subprocess.run([sys.executable, "-c", ASKED_BESIDE, "ignored"], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGTERM, "", "")
+
+
+ENDED_WHILE_BUNDLING = """
+import os, signal, sys, time
+import firable.decompose.bundling as bundling
+from firable.cli.main import main
+
+stage, sent, of_the_stage = sys.argv[1:4]
+work = getattr(bundling, stage)
+
+def ended(*arguments, **options):
+    try:
+        os.kill(os.getpid(), getattr(signal, sent))
+        while True:  # z3 has left the signal such that it ends no longer sleep
+            time.sleep(0.01)
+    except KeyboardInterrupt:
+        if of_the_stage == "told":
+            raise
+    return work(*arguments, **options)
+
+setattr(bundling, stage, ended)
+sys.exit(main(["bundle", "catalogue:one_robot", "-o", "cell.bundle"]))
+"""
+
+
+@pytest.mark.parametrize(
+    ("stage", "sent", "of_the_stage", "doing"),
+    [
+        ("votes", "SIGINT", "told", "votes"),
+        ("prove", "SIGINT", "kept", r"Eq\. \(7\)"),
+        ("evidence_of_report", "SIGTERM", "told", "evidence on the net"),
+        ("evidence_of_report", "SIGTERM", "kept", "protocol"),
+        ("proved_without_exploring", "SIGINT", "kept", "seal"),
+    ],
+)
+def test_ctrl_c_ends_the_making_of_a_bundle_with_what_is_known(
+    tmp_path: Path, stage: str, sent: str, of_the_stage: str, doing: str
+) -> None:
+    """Also where a part of the work has taken it for itself, as one does that tells then what it has."""
+    (tmp_path / "cell.bundle").write_text("as it was", "utf-8")
+    command = [sys.executable, "-c", ENDED_WHILE_BUNDLING, stage, sent, of_the_stage]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 3, done.stderr
+    told = rf"  \? unknown +bundle +all that the bundle must hold is proved\n      reached: interrupted: {doing}\n"
+    assert re.search(told, done.stdout), done.stdout
+    assert re.search(r"not decided: \d+ unknown, \d+ proved, 1 warning\n  no bundle was made", done.stdout)
+    assert "cell.bundle was not made by this call" in done.stderr
+    assert [one.read_text("utf-8") for one in tmp_path.iterdir()] == ["as it was"]
 
 
 def test_a_device_that_is_no_terminal_is_no_closed_one() -> None:

@@ -14,8 +14,9 @@ from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.goal import Limits
 from firable.analysis.report import CheckReport
 from firable.cli.main import main
-from firable.decompose.bundling import make_bundle
+from firable.decompose.bundling import UnbundledError, make_bundle
 from firable.decompose.proofs.families import FAMILIES
+from firable.decompose.proofs.family import Proved, Task
 from firable.decompose.proofs.proving import prove
 from firable.decompose.proofs.standing import standing
 from firable.decompose.protocol.parametric.side_conditions import side_conditions
@@ -53,6 +54,25 @@ def not_bundled(report: CheckReport) -> str:
         make_bundle(report)
     assert {diagnostic.code for diagnostic in refusal.value.diagnostics} == {"F4003"}
     return str(refusal.value)
+
+
+def test_what_ctrl_c_has_ended_is_not_bundled_and_tells_what_was_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    report, begun = check(load_net("ring")), list[str]()
+
+    def solving(_: Task) -> Proved:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as interrupted:
+        interrupted.setattr("firable.decompose.proofs.proving.FAMILIES", (replace(FAMILIES[0], prove=solving),))
+        with pytest.raises(UnbundledError, match=r"error\[F3004\]: interrupted: Eq\. \(7\)") as ended:
+            make_bundle(report, begins=begun.append)
+    assert begun == ["votes", FAMILIES[0].title]
+    assert ended.value.verdicts[: len(report.verdicts)] == report.verdicts
+    left = {verdict.name: verdict.status for verdict in ended.value.verdicts[len(report.verdicts) :]}
+    assert left == {FAMILIES[0].name: Status.UNKNOWN, "bundle": Status.UNKNOWN}
+    begun.clear()
+    make_bundle(report, begins=begun.append)
+    assert begun[-1] == "seal"
 
 
 def test_net_with_anything_unproved_is_not_bundled() -> None:
