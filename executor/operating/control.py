@@ -28,6 +28,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import secrets
+import socket
 import ssl
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Iterable
@@ -198,6 +199,15 @@ async def serving(
         yield address
 
 
+async def sockets_of(endpoint: Endpoint) -> list[socket.socket]:
+    """The sockets that listen at the address of an endpoint; raises `InputError` F5061."""
+    try:
+        return await listening_at(endpoint.host, endpoint.port)
+    except OSError as error:
+        message = f"nothing can be served at {endpoint.host}:{endpoint.port}: {reason(error)}"
+        raise InputError([Diagnostic("F5061", message, "name another port; 0 takes a free one")]) from None
+
+
 @asynccontextmanager
 async def listening(app: web.Application, endpoint: Endpoint, strangers: Strangers | None = None) -> AsyncIterator[str]:
     """Serve an application for as long as the context lasts; gives the address, and raises `InputError` F5061."""
@@ -216,11 +226,7 @@ async def listening(app: web.Application, endpoint: Endpoint, strangers: Strange
     keepers: list[asyncio.Task[None]] = []
     sockets = []
     try:
-        try:
-            sockets = await listening_at(endpoint.host, endpoint.port)
-        except OSError as error:
-            message = f"nothing can be served at {endpoint.host}:{endpoint.port}: {reason(error)}"
-            raise InputError([Diagnostic("F5061", message, "name another port; 0 takes a free one")]) from None
+        sockets = await sockets_of(endpoint)
         keepers += [asyncio.create_task(door.keep(one)) for one in sockets]
         host, port = sockets[0].getsockname()[:2]
         shown = f"[{host}]" if ":" in host else host

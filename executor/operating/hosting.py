@@ -26,7 +26,13 @@ from firable.executor.operating.host import Host
 from firable.executor.operating.local_monitor import LocalMonitor
 from firable.executor.operating.monitor import Divergence
 from firable.executor.operating.own_certificate import fault_of, fault_of_authority, remedy_of, unloaded
-from firable.executor.operating.service import demand_no_loop, figures_for, patience_with, run_to_the_end
+from firable.executor.operating.service import (
+    demand_address,
+    demand_no_loop,
+    figures_for,
+    patience_with,
+    run_to_the_end,
+)
 from firable.executor.operating.situation import Situation
 from firable.executor.operating.taken_up import NOWHERE, On, opened
 from firable.executor.operating.whereabouts import machines_at
@@ -225,11 +231,13 @@ def run_host(
 
     Where a `plant` says what the machines should do, those here are held against it as the run goes, until it is taken
     up or reset. With a service, it stays after an emergency stop until that is reset. Raises `InputError` as drivers,
-    link, journal and trace do, F5003 where the plant does not fit, and F5106 where another program commands a device,
-    before anything is written; `RuntimeError` within an event loop, before that.
+    link, journal and trace do, F5003 where the plant does not fit, F5061 where the address of the service is taken, and
+    F5106 where another program commands a device, before anything is written; `RuntimeError` within an event loop,
+    before that.
     """
     demand_no_loop()
     driver = drivers()
+    demand_address(conduct.service)
     if conduct.journal_path is not None:
         refuse_taken_over(conduct.journal_path)
     at: Mapping[str, str] = NOWHERE

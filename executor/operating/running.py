@@ -27,7 +27,13 @@ from firable.executor.journal.sqlite_journal import refuse_taken_over
 from firable.executor.operating.conduct import UNATTENDED, Conduct, Watch
 from firable.executor.operating.host import Host
 from firable.executor.operating.monitor import Divergence, Monitor
-from firable.executor.operating.service import demand_no_loop, figures_for, patience_with, run_to_the_end
+from firable.executor.operating.service import (
+    demand_address,
+    demand_no_loop,
+    figures_for,
+    patience_with,
+    run_to_the_end,
+)
 from firable.executor.operating.situation import Situation, State
 from firable.executor.operating.taken_up import Files, opened
 from firable.executor.operating.whereabouts import machines_at
@@ -131,9 +137,9 @@ def run_simulated(bundle: Bundle, cell: SimulatedCell, conduct: Conduct = UNATTE
     `State.HELD`, unless an operator is there, or `resume` says beforehand that it may go on as soon as each command is
     accounted for. The machines are held against their plant file as the run goes (`watch`).
 
-    Raises `InputError` F5002 where the bundle is not proved, F5003 where the plant does not fit it, and `RuntimeError`
-    within an event loop, all before a file is touched; F1017 where the trace cannot be written, and F5031 to F5035
-    where the journal or the simulated cell cannot be gone on with.
+    Raises `InputError` F5002 where the bundle is not proved, F5003 where the plant does not fit it, F5061 where the
+    address of the service is taken, and `RuntimeError` within an event loop, all before a file is touched; F1017 where
+    the trace cannot be written, and F5031 to F5035 where the journal or the simulated cell cannot be gone on with.
     """
     if problems := unproved(bundle):
         raise InputError(problems)
@@ -153,6 +159,7 @@ def execute(
     net = decomposition.net
     if problems := misfits(cell.plant, net):
         raise InputError(problems)
+    demand_address(conduct.service)
     plant = Plant(cell.plant, workpieces=cell.workpieces, seed=cell.seed, disturbances=cell.disturbances)
     kept = (cell.plant, cell.workpieces, cell.seed)
     with opened(decomposition, digest, conduct.journal_path, conduct.trace, simulated=kept) as files:
@@ -188,15 +195,16 @@ def run_bound(
     device and sentence; the machines are watched where a `plant` says what they do.
 
     Raises `InputError` F5002 where the bundle is not proved, F5003 where the plant does not fit it, F5101 where the
-    binding does not, and `RuntimeError` within an event loop, all before anything is connected; F5106 where another
-    program commands a device, before anything is written; F1017 where the trace cannot be written, and F5031 to F5036
-    where the journal cannot be gone on with.
+    binding does not, F5061 where the address of the service is taken, and `RuntimeError` within an event loop, all
+    before anything is connected; F5106 where another program commands a device, before anything is written; F1017 where
+    the trace cannot be written, and F5031 to F5036 where the journal cannot be gone on with.
     """
     demand_no_loop()
     net, decomposition = bundle.net, bundle.decomposition
     if problems := (*unproved(bundle), *(misfits(plant, net) if plant is not None else ())):
         raise InputError(problems)
     driver = bound_driver(binding, net)
+    demand_address(conduct.service)
     if conduct.journal_path is not None:
         refuse_taken_over(conduct.journal_path)
     listen_first(driver.binding)

@@ -72,6 +72,15 @@ def demand_no_loop() -> None:
     raise RuntimeError(message)
 
 
+def demand_address(service: Service | None) -> None:
+    """Raise `InputError` F5061 where the address of an endpoint is not to be had, before a run has touched a file."""
+    if service is not None:
+        from firable.executor.operating.control import sockets_of
+
+        for one in asyncio.run(sockets_of(service.endpoint)):
+            one.close()
+
+
 def run_to_the_end(host: Host, *, virtual: bool = False) -> Situation:
     """Run a host on an event loop of its own; Ctrl-C or a request to terminate ends it in order."""
     if virtual:

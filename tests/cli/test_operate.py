@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import re
 import resource
+import socket
 import stat
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -19,6 +21,7 @@ from support.waiting import PATIENCE_SECONDS, until
 from firable.cli.main import main
 from firable.cli.operate import ServeOptions
 from firable.executor.operating.control import new_token
+from firable.nets.catalogue import catalogue_path
 from firable.nets.diagnostics import InputError
 from firable.semantics.trace import CommandSent, Noted, read_trace
 
@@ -294,6 +297,22 @@ def test_what_cannot_be_served_is_refused_before_the_run_begins(
 ) -> None:
     assert main(["run", str(bundle), *arguments]) == 2
     assert told in capsys.readouterr().err
+
+
+def test_a_run_whose_address_is_taken_leaves_nothing(
+    bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    journal, trace = tmp_path / "cell.journal", tmp_path / "cell.trace"
+    binding = str(catalogue_path("one_robot").with_name("one_robot.bind.yaml"))
+    host = ("--controller", "robot", "--join", "tcp/127.0.0.1:9", "--dry-run", "1")
+    with closing(socket.create_server(("127.0.0.1", 0))) as other:
+        address = f"127.0.0.1:{other.getsockname()[1]}"
+        for of in (("--speed", "1"), ("--bind", binding), host):
+            files = ("--journal", str(journal), "--trace", str(trace))
+            assert main(["run", str(bundle), *of, "--serve", address, *files]) == 2
+            said = capsys.readouterr().err
+            assert f"error[F5061]: nothing can be served at {address}: Address already in use" in said
+            assert list(tmp_path.iterdir()) == []
 
 
 def test_a_run_takes_all_the_descriptors_that_it_may_have(bundle: Path) -> None:
