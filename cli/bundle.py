@@ -150,7 +150,7 @@ def _plant(asked: _Asked, net: Net) -> tuple[str, tuple[Diagnostic, ...]]:
     """The text of the plant file, and what it warns of; nothing where none is named."""
     if asked.machines is None:
         return "", ()
-    from firable.nets.machines.plant_file import late_limits
+    from firable.nets.machines.fitting import late_limits
 
     text, model = read_fitting(asked.machines, net)
     return text, late_limits(model, net)

@@ -53,7 +53,7 @@ def read_machines(argument: str) -> PlantModel:
 def read_machines_of(argument: str, net: Net) -> PlantModel:
     """The plant that an argument names, after it was found to be that of the net's cell."""
     from firable.nets.diagnostics import InputError
-    from firable.nets.machines.plant_file import of_another_cell
+    from firable.nets.machines.fitting import of_another_cell
 
     model = read_machines(argument)
     if problems := of_another_cell(model, net):
@@ -64,7 +64,8 @@ def read_machines_of(argument: str, net: Net) -> PlantModel:
 def read_fitting(argument: str, net: Net) -> tuple[str, PlantModel]:
     """The plant that an argument names, with the text of its file, after it was found to fit the net."""
     from firable.nets.diagnostics import InputError
-    from firable.nets.machines.plant_file import SIZE_BYTES_MAX, misfits, of_another_cell, parse_plant
+    from firable.nets.machines.fitting import misfits, of_another_cell
+    from firable.nets.machines.plant_file import SIZE_BYTES_MAX, parse_plant
     from firable.nets.source import read_source
 
     source = read_source(_plant_file(argument), SIZE_BYTES_MAX)
@@ -103,7 +104,7 @@ def loop_report(
     from firable.analysis.cures.finding import with_circle
     from firable.analysis.loop.faults import ask_faults
     from firable.analysis.loop.verdicts import check_loop
-    from firable.nets.machines.plant_file import late_limits
+    from firable.nets.machines.fitting import late_limits
     from firable.nets.verdict import held_to
 
     loaded = load_found(argument)

@@ -114,7 +114,7 @@ def _report(
     if machines is not None:
         from firable.analysis.spaces.reachability import Budget
         from firable.decompose.proofs.held_gates import held_gates
-        from firable.nets.machines.plant_file import late_limits
+        from firable.nets.machines.fitting import late_limits
 
         model = read_machines_of(machines, loaded.net)
         held = held_gates(decomposition, model, Budget(seconds=timeout))

@@ -171,7 +171,8 @@ def run(
 
 def _warn_of_other_machines(bundle: Bundle, model: PlantModel) -> None:
     """Tell where the machines are not those with which the bundle was proved."""
-    from firable.nets.machines.plant_file import otherwise_than, parse_plant
+    from firable.nets.machines.fitting import otherwise_than
+    from firable.nets.machines.plant_file import parse_plant
 
     if (sealed := bundle.evidence.get("plant.yaml")) is not None:
         for problem in otherwise_than(parse_plant(sealed), model):

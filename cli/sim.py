@@ -93,7 +93,7 @@ def sim(
     from firable.executor.drivers.fitting import misfits as binding_misfits
     from firable.executor.operating.uncut import ended_by_signals
     from firable.nets.diagnostics import InputError
-    from firable.nets.machines.plant_file import late_limits, misfits
+    from firable.nets.machines.fitting import late_limits, misfits
 
     loaded = load_net(net).net
     model = read_machines_of(plant or plant_for(net, loaded.name), loaded)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def run_simulated_of(path: str, bundle: Bundle, cell: SimulatedCell, conduct: Conduct) -> Report:
     """Run until the workpieces have gone through, or nothing can go on, and report how it ended."""
     from firable.executor.operating.running import run_simulated
-    from firable.nets.machines.plant_file import late_limits
+    from firable.nets.machines.fitting import late_limits
 
     for late in late_limits(cell.plant, bundle.net):  # before the run, which may go round in a circle
         text.show_diagnostic(late)

@@ -74,7 +74,7 @@ def view(
     from firable.cli.view.playing import Playing
     from firable.cli.view.runs import Run
     from firable.nets.diagnostics import InputError
-    from firable.nets.machines.plant_file import misfits
+    from firable.nets.machines.fitting import misfits
     from firable.semantics.trace import read_trace
 
     loaded = load_net(net)

@@ -37,7 +37,8 @@ from firable.executor import Host
 from firable.executor.operating.latch import may_stay
 from firable.executor.operating.restart import asked_of_the_operator
 from firable.executor.protocol.token_player import TokenPlayer, Word
-from firable.nets.machines.plant_file import PlantModel, misfits
+from firable.nets.machines.fitting import misfits
+from firable.nets.machines.plant_file import PlantModel
 from firable.nets.net import Net
 from firable.semantics.joining import APPLIED, STANDS, VOTED
 from firable.semantics.trace import CommandSent, Event, Fired, Noted, SignalChanged

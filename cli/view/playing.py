@@ -21,7 +21,8 @@ from firable.cli.view.site import BODY_BYTES_MAX, PUBLIC, Opening, answering, fi
 from firable.cli.view.top_view import top_of
 from firable.executor.operating.control import Endpoint, admission
 from firable.nets.loading import Loaded
-from firable.nets.machines.plant_file import PlantModel, misfits, of_another_cell
+from firable.nets.machines.fitting import misfits, of_another_cell
+from firable.nets.machines.plant_file import PlantModel
 from firable.nets.verdict import Verdict
 from firable.semantics.player import Player
 

@@ -21,7 +21,8 @@ from collections.abc import Callable, Collection, Iterator
 from firable.executor.operating.monitor import LATENCY_SECONDS, Divergence, Monitor
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError
-from firable.nets.machines.plant_file import Carry, Clamp, Machine, PlantModel, Process, Release, Sensor, misfits
+from firable.nets.machines.fitting import misfits
+from firable.nets.machines.plant_file import Carry, Clamp, Machine, PlantModel, Process, Release, Sensor
 from firable.semantics.joining import APPLIED
 from firable.semantics.trace import Event, Fired, Noted
 

@@ -41,7 +41,8 @@ from firable.nets.bundle import Bundle, read_bundle
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError
 from firable.nets.layers import Layers
-from firable.nets.machines.plant_file import PlantModel, misfits
+from firable.nets.machines.fitting import misfits
+from firable.nets.machines.plant_file import PlantModel
 from firable.nets.right_to_run import unproved
 
 Operator = Callable[[Host], Awaitable[None]]

@@ -38,10 +38,11 @@ from types import MappingProxyType
 from typing import Final
 
 from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.machines.fitting import misfits
 from firable.nets.machines.laws import Laws, fact
 from firable.nets.machines.loop import ACCIDENT, OVERRUN, PLANT, UNSENT, ClosedLoop, Faults, Sending
 from firable.nets.machines.moment import NOTHING, Case, Literal, Moment, each
-from firable.nets.machines.plant_file import Failure, PlantModel, Stop, misfits
+from firable.nets.machines.plant_file import Failure, PlantModel, Stop
 from firable.nets.machines.telling import Telling
 from firable.nets.net import Controller, Net, Place, SignalKind, Transition
 from firable.nets.well_formed import as_name

@@ -13,7 +13,8 @@ from firable.analysis.report import CheckReport
 from firable.nets.catalogue import catalogue_net, catalogue_path, catalogue_plant
 from firable.nets.diagnostics import InputError
 from firable.nets.machines.closing import close
-from firable.nets.machines.plant_file import misfits, parse_plant
+from firable.nets.machines.fitting import misfits
+from firable.nets.machines.plant_file import parse_plant
 from firable.nets.net import ExternalGate, Fairness, Net, Property
 from firable.nets.text import parse_net
 from firable.nets.time_limits import only_after_a_timeout

@@ -14,7 +14,8 @@ from firable.executor.drivers.bound import bound_driver
 from firable.nets.catalogue import catalogue_net, catalogue_path, catalogue_tasks
 from firable.nets.diagnostics import InputError, did_you_mean
 from firable.nets.editing import edits
-from firable.nets.machines.plant_file import misfits, parse_plant
+from firable.nets.machines.fitting import misfits
+from firable.nets.machines.plant_file import parse_plant
 from firable.nets.net import Controller, Net
 from firable.nets.pnml import parse_pnml
 from firable.nets.queries import query_named

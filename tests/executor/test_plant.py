@@ -10,7 +10,8 @@ from firable.executor.cell.disturbances import Drops, NeverCompletes, StuckSenso
 from firable.executor.cell.plant import CommandDone, SensorChanged, Workpiece
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.diagnostics import InputError, Severity
-from firable.nets.machines.plant_file import late_limits, misfits, otherwise_than, parse_plant, read_plant
+from firable.nets.machines.fitting import late_limits, misfits, otherwise_than
+from firable.nets.machines.plant_file import parse_plant, read_plant
 
 CELLS = [
     *("one_robot", "one_robot_mc_late", "one_robot_mc_late_capacity", "two_robots_shared", "two_robots_separate"),

@@ -28,8 +28,9 @@ from firable.executor.operating.watched_loop import WatchedLoop
 from firable.executor.protocol.commands import Answer
 from firable.nets.diagnostics import InputError
 from firable.nets.machines.closing import close
+from firable.nets.machines.fitting import misfits, otherwise_than
 from firable.nets.machines.loop import ClosedLoop, Faults, Sending
-from firable.nets.machines.plant_file import PlantModel, misfits, otherwise_than, parse_plant
+from firable.nets.machines.plant_file import PlantModel, parse_plant
 from firable.nets.net import Net
 from firable.nets.text import parse_net
 from firable.nets.verdict import Status
