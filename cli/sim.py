@@ -251,6 +251,7 @@ def _disturbances(
     """What was asked to go wrong; a name that the cell has not is a mistake."""
     from firable.executor.cell.disturbances import Drops, NeverCompletes, StuckSensor
     from firable.nets.diagnostics import did_you_mean
+    from firable.nets.machines.plant_file import Switch
 
     found: list[Disturbance] = []
     for text in stuck:
@@ -272,6 +273,8 @@ def _disturbances(
                 raise click.UsageError(f"the cell has no command '{text}'; {hint}it has {', '.join(commands)}")
             if int(occurrence or 1) < 1:
                 raise click.UsageError(f"'{text}' never comes: the first time is #1")
+            if kind is NeverCompletes and isinstance(commands[name][1], Switch):
+                raise click.UsageError(f"--hang {text}: '{name}' is done as it is sent, and nobody waits for its end")
             if kind is Drops and not _may_hold(*commands[name]):
                 holding = [one for one in commands if _may_hold(*commands[one])]
                 named = f"name one of {', '.join(holding)}" if holding else "no command of this cell ends so"
@@ -283,9 +286,9 @@ def _disturbances(
 
 def _may_hold(machine: Machine, action: Action) -> bool:
     """Whether a machine may hold something when a command ends: it can take something up, and does not lay it down."""
-    from firable.nets.machines.plant_file import Carry, Grasp, Put, Stop
+    from firable.nets.machines.plant_file import Carry, Grasp, Put, Stop, Switch
 
-    return not isinstance(action, Carry | Put | Stop) and any(
+    return not isinstance(action, Carry | Put | Stop | Switch) and any(
         isinstance(one, Grasp | Carry) for one in machine.commands.values()
     )
 

@@ -38,7 +38,7 @@ def run_simulated_of(path: str, bundle: Bundle, cell: SimulatedCell, conduct: Co
         bundle.net,
         _verdicts(
             report,
-            cell.workpieces,
+            cell.going_through,
             cell.seed,
             is_kept=conduct.journal_path is not None,
             awaits_another=_awaits_another(report, cell),

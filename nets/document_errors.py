@@ -382,6 +382,10 @@ def _wanted(kind: str, context: Mapping[str, Any], node: Node, path: Path) -> st
             return "a time is expected, such as `5s`, or a mapping with `time: 5s`"
         case "list_type" | "too_short" if path[-1:] == ("departures",):
             return "`{station: NAME}`, or a list of these, is expected"
+        case "dict_type" | "too_short" if path[-1:] == ("next",):
+            return "which station is next to which is expected: `{load: drill, drill: unload}`"
+        case "dict_type" if path == ("full_at_first",):
+            return "what lies on which station is expected: `{drill: raw}`, or `machined`"
         case "nothing_given":
             return f"write it, or leave `{path[-1]}` out for what holds without it"
         case "no_arcs":

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from firable.cli.view.site import refusal
-from firable.nets.machines.plant_file import Carry, Grasp, Move, PlantModel, Process, Put, Release
+from firable.nets.machines.plant_file import Carry, Grasp, Index, Move, PlantModel, Process, Put, Release
 from firable.nets.net import Net, Place
 
 
@@ -66,9 +66,11 @@ class Stage:
     plant: PlantModel
 
     def begin(self) -> Scene:
-        """All at rest, and no workpiece there: a place that holds a token at first has sent no command."""
+        """All at rest, and no workpiece has come: a place that holds a token at first has sent no command."""
         hands = {name: one.hand for name, one in self.plant.machines.items() if one.hand is not None}
-        return Scene((), hands, {})
+        full = enumerate(self.plant.full_at_first.items(), 1)
+        pieces = tuple(Piece(number, station, kind == "machined") for number, (station, kind) in full)
+        return Scene(pieces, hands, {}, len(pieces))
 
     def sent(self, scene: Scene, name: str) -> Scene:
         """A place has sent its command; one that nobody waits for is done at once."""
@@ -101,6 +103,10 @@ class Stage:
                 return scene.moved(machine, at)
             case Carry(target=target) if scene.on(target) is None:
                 return scene.moved(machine, target)
+            case Index(following=following):
+                pieces = tuple(replace(piece, on=following.get(piece.on, piece.on)) for piece in scene.pieces)
+                is_apart = len({piece.on for piece in pieces}) == len(pieces)
+                return replace(scene, pieces=pieces) if is_apart else scene
             case Process(station=station):
                 pieces = tuple(replace(p, machined=True) if p.on == station else p for p in scene.pieces)
                 return replace(scene, pieces=pieces)

@@ -16,6 +16,7 @@ place waits until then.
     M/still-done/P     what M breaks off, because it is stopped at P, is done before it has come to rest;
     M/still-accident/P it ends in an accident
     M/fails/P          M, at the command of P, fails, while no other machine has;   M/repaired   it goes on
+    M/takes/P/X        M, which indexes at P, takes what lies on station X;   M/lays/P/X   lays that on the next one
     S/shown            the sensor of an acknowledged completion shows it
     arrives/E, leaves/E   a workpiece comes, or is taken away
     X/judged           the workpiece on a station is found good, or not
@@ -43,12 +44,26 @@ from firable.decompose.verification.plant import (
     UNTOLD,
     DiffersError,
     State,
+    Step,
     Things,
     Value,
     target_of,
 )
 from firable.nets.machines.loop import Faults, Sending
-from firable.nets.machines.plant_file import Action, Carry, Clamp, Departure, Grasp, Move, Process, Put, Release, Stop
+from firable.nets.machines.plant_file import (
+    Action,
+    Carry,
+    Clamp,
+    Departure,
+    Grasp,
+    Index,
+    Move,
+    Process,
+    Put,
+    Release,
+    Stop,
+    Switch,
+)
 from firable.nets.net import Place, Transition
 from firable.nets.well_formed import as_name
 
@@ -83,8 +98,12 @@ class Plant(Things):
         for place in self.commanding if self.sending is Sending.LATE else ():
             yield f"sent/{place.name}", (partial(self.sent_late, place), [place])
         for place in self.commanding:
-            if place.name not in self.stops:
+            if place.name not in self.momentary:
                 yield f"{as_name(self.machine_of(place))}/done/{place.name}", (partial(self.done, place), [place])
+            steps = self.steps_of(place) if isinstance(self.action(place), Index) else []
+            for step, next_ in zip(steps, [*(one.name for one in steps[1:]), None], strict=False):
+                name = f"{as_name(self.machine_of(place))}/{step.does}/{place.name}/{as_name(step.at)}"
+                yield name, (partial(self.goes_on, place, step, next_), [place])
 
     def _by_themselves(self) -> Iterator[tuple[str, Happens]]:
         for timer in self.timers:
@@ -104,7 +123,7 @@ class Plant(Things):
             ways |= {"clears": partial(self.wavers, name, "clears")} if sensor.may_linger else {}
             yield from ((f"{name}/{way}", partial(self.once_it_is_told, name, does)) for way, does in ways.items())
         for place in self.commanding:
-            if place.name not in self.stops:
+            if place.name not in self.momentary:
                 yield f"{as_name(self.machine_of(place))}/accident/{place.name}", partial(self.spoils, place)
         for name in self.model.machines:
             for place in self.may_break_off(name):
@@ -280,19 +299,48 @@ class Plant(Things):
         elif isinstance(action, Process):
             right = bool(state[f"clamped {action.station}"]) and state[f"has {action.station}"] == "raw"
             yield {at: place.name} if right else {ACCIDENT: True}
+        elif isinstance(action, Index):
+            if state[f"step {name}"] is not None:
+                return  # it is never idle in the midst of an index
+            wrong = [bool(state[f"clamped {one}"]) for one in action.following if one in self.clamps]
+            others = (other for other in self.tables_at(self.ends_of(name)) if other != name)
+            wrong += [state[f"step {other}"] is not None for other in others]
+            begun: Changes = {at: place.name, f"step {name}": self.steps_of(place)[0].name}
+            yield {ACCIDENT: True} if any(wrong) else begun
+        elif isinstance(action, Switch):
+            yield {}
         else:
             yield {at: place.name}
+
+    def goes_on(self, place: Place, step: Step, next_: str | None, state: State) -> Iterator[Changes]:
+        """A machine that indexes takes what lies on a station, if anything does; or lays that on the next one."""
+        machine = self.machine_of(place)
+        if state[f"at {machine}"] != place.name or state[f"step {machine}"] != step.name:
+            return
+        if self.has_failed(machine, state) or self.is_still_to_be_told(machine, state):
+            return
+        ends = [f"has {step.at}", f"has {machine} from {step.at}"]
+        source, target = ends if step.does == "takes" else (ends[1], f"has {step.to}")
+        if state[source] is None:
+            yield {f"step {machine}": next_}
+        elif state[target] is None:
+            changes = self.unjudged({f"step {machine}": next_, source: None, target: state[source]})
+            yield from ({**changes, **seen} for seen in self.sensors_see(changes, state))
+
+    def is_indexed(self, station: str, state: State) -> bool:
+        """Whether a machine is in the midst of an index there."""
+        return any(state[f"step {table}"] is not None for table in self.tables_at([station]))
 
     def stopped(self, place: Place, state: State) -> Iterator[Changes]:
         """A machine leaves what it is at undone, or breaks it off: that may still be done until it is at rest."""
         name = self.machine_of(place)
         at, breaks = f"at {name}", f"breaks off {name}"
-        changes: Changes = {at: None if place.name in self.stops else place.name}
+        changes: Changes = {at: None if place.name in self.momentary else place.name}
         if state[at] is not None and breaks in self.things:
             was = self.net.place(str(state[at]))
             if isinstance(self.action(was), Stop):
-                changes |= {breaks: None} if place.name in self.stops else {}
-            elif was in self.may_break_off(name) and place.name not in self.stops:
+                changes |= {breaks: None} if place.name in self.momentary else {}
+            elif was in self.may_break_off(name) and place.name not in self.momentary:
                 changes |= {breaks: was.name}
         yield changes
 
@@ -328,10 +376,14 @@ class Plant(Things):
                     yield from self.moves(station, name, state)
             case Put():
                 station = self.model.machines[name].positions[self.where(place, "at")]
-                if station is not None:
+                if station is not None and not self.is_indexed(station, state):
                     yield from self.moves(name, station, state)
             case Carry(target=target):
-                yield from self.moves(name, target, state)
+                if not self.is_indexed(target, state):
+                    yield from self.moves(name, target, state)
+            case Index():
+                if state[f"step {name}"] is None:
+                    yield {}
             case Clamp(station=station):
                 if state[f"has {station}"] is not None:
                     yield {f"clamped {station}": True}
@@ -404,8 +456,10 @@ class Plant(Things):
     def goes_wrong(self, name: str, action: Action, place: Place, state: State) -> bool:
         """Whether it does."""
 
-        def collides(station: str) -> bool:
-            return state[f"has {station}"] is not None and state[f"has {name}"] is not None
+        def collides(station: str, when_full: str) -> bool:
+            is_free = state[f"has {station}"] is None
+            wrong = self.is_indexed(station, state) if is_free else when_full == "collide"
+            return wrong and state[f"has {name}"] is not None
 
         match action:
             case Grasp():
@@ -415,9 +469,15 @@ class Plant(Things):
                 return station in self.clamps and bool(state[f"clamped {station}"])
             case Put(when_full=when_full):
                 station = self.model.machines[name].positions[self.where(place, "at")]
-                return station is None or (when_full == "collide" and collides(station))
+                return station is None or collides(station, when_full)
             case Carry(target=target, when_full=when_full):
-                return when_full == "collide" and collides(target)
+                return collides(target, when_full)
+            case Index():
+                now = (step for step in self.steps_of(place) if state[f"step {name}"] == step.name)
+                return any(
+                    step.does == "lays" and None not in (state[f"has {name} from {step.at}"], state[f"has {step.to}"])
+                    for step in now
+                )
             case Clamp(station=station) | Process(station=station):
                 return state[f"has {station}"] is None
         return False
@@ -460,9 +520,9 @@ class Plant(Things):
             yield {f"acknowledged {name}": False, f"signal {name}": True}
 
     def arrives(self, state: State) -> Iterator[Changes]:
-        """A raw workpiece comes to the first station."""
+        """A raw workpiece comes to the first station, unless a machine is in the midst of an index there."""
         entry = f"has {self.model.arrivals.station}"
-        if state[entry] is None:
+        if state[entry] is None and not self.is_indexed(self.model.arrivals.station, state):
             yield from ({entry: "raw", **seen} for seen in self.sensors_see({entry: "raw"}, state))
 
     def leaves(self, out: Departure, state: State) -> Iterator[Changes]:

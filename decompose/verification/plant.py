@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
+from typing import Final, NamedTuple
 
 from firable.nets.machines.excluding import with_one_token
 from firable.nets.machines.loop import Faults, Sending
@@ -21,12 +21,14 @@ from firable.nets.machines.plant_file import (
     Clamp,
     Failure,
     Grasp,
+    Index,
     PlantModel,
     Process,
     Put,
     Release,
     Sensor,
     Stop,
+    Switch,
     Work,
 )
 from firable.nets.net import Net, Place, SignalKind, Transition
@@ -52,6 +54,15 @@ class UncomparedError(Exception):
     def __init__(self, happening: str) -> None:
         super().__init__(f"'{happening}' looks at more things than are compared")
         self.happening = happening
+
+
+class Step(NamedTuple):
+    """A step of a machine that indexes: it `takes` what lies on a station, or `lays` on the next one what it took."""
+
+    name: str
+    does: str
+    at: str
+    to: str
 
 
 @dataclass(frozen=True)
@@ -104,6 +115,16 @@ class Things:
             if machine.hand is not None or any(isinstance(one, Carry) for one in machine.commands.values()):
                 kinds: dict[Value, str] = {kind: f"{its}.holds_{kind}" for kind in self.kinds}
                 found[f"has {name}"] = {None: f"{its}.holds_nothing"} | kinds
+            if name in self.tables:
+                steps: dict[Value, str] = {
+                    step.name: f"{its}.{as_name(command)}.{step.does}.{as_name(step.at)}"
+                    for command, some in self.tables[name].items()
+                    for step in some
+                }
+                found[f"step {name}"] = {None: f"{its}.steady"} | steps
+                for station in self.taken_by(name):
+                    held: dict[Value, str] = {kind: f"{its}.from.{as_name(station)}.{kind}" for kind in self.kinds}
+                    found[f"has {name} from {station}"] = {None: f"{its}.from.{as_name(station)}.nothing"} | held
         for name in self.model.stations:
             its = f"plant.{as_name(name)}"
             lies: dict[Value, str] = {kind: f"{its}.{kind}" for kind in self.kinds}
@@ -125,13 +146,13 @@ class Things:
         return found
 
     def values(self, thing: str) -> list[Value]:
-        """The values that a thing may have; no machine is ever at a command that stops it at once."""
+        """The values that a thing may have; no machine is ever at a command that takes no time."""
         places = self.things[thing]
         if all(isinstance(value, bool) for value in places):
             return [False, True]
         if thing.startswith("judged "):
             return [None, *places]
-        never = self.stops if thing.startswith("at ") else ()
+        never = self.momentary if thing.startswith("at ") else ()
         return [value for value in places if value not in never]
 
     # --- What there can be
@@ -200,9 +221,14 @@ class Things:
 
     @cached_property
     def start(self) -> State:
-        """All is at rest, and no workpiece has come; a token in M0 sends no command."""
+        """All is at rest, and no workpiece has come yet; a token in M0 sends no command."""
         first: dict[str, Value] = {thing: None if None in self.values(thing) else False for thing in self.things}
         first |= {f"token of {p.name}": p.marked for p in self.net.places}
+        first |= {f"has {station}": kind for station, kind in self.model.full_at_first.items()}
+        for name, sensor in self.model.sensors.items():
+            if sensor.occupied in self.model.full_at_first:
+                told = () if name in self.completions else (f"told {name}",)
+                first |= {thing: True for thing in (f"bit {name}", *told) if thing in self.things}
         return first | {f"hand {name}": m.hand for name, m in self.model.machines.items() if m.hand is not None}
 
     @cached_property
@@ -211,19 +237,53 @@ class Things:
         return tuple(place for place in self.net.places if place.command is not None)
 
     @cached_property
-    def stops(self) -> set[str]:
-        """Those whose command stops the machine at once: it takes no time, and nobody waits for its end."""
+    def momentary(self) -> set[str]:
+        """Those whose command takes no time, and nobody waits for its end: it stops the machine at once, or switches
+        something."""
         some = ((place, self.action(place)) for place in self.commanding if place.completion is None)
-        return {place.name for place, one in some if isinstance(one, Stop) and not one.takes_s and not one.jitter_s}
+        return {
+            place.name
+            for place, one in some
+            if isinstance(one, Switch) or (isinstance(one, Stop) and not one.takes_s and not one.jitter_s)
+        }
+
+    @cached_property
+    def tables(self) -> dict[str, dict[str, list[Step]]]:
+        """For each machine that the net has index, and each of the commands by which it does, its steps."""
+        found: dict[str, dict[str, list[Step]]] = {}
+        for place in self.commanding:
+            if place.command is not None and isinstance(action := self.action(place), Index):
+                ways = [(does, *way) for does in ("takes", "lays") for way in action.following.items()]
+                steps = [Step(f"{place.command.command} {does} {at}", does, at, to) for does, at, to in ways]
+                found.setdefault(place.command.machine, {})[place.command.command] = steps
+        return found
+
+    def steps_of(self, place: Place) -> list[Step]:
+        """Those of an index that a place commands."""
+        assert place.command is not None
+        return self.tables[place.command.machine][place.command.command]
+
+    def taken_by(self, table: str) -> list[str]:
+        """The stations from which a machine takes workpieces when it indexes."""
+        return list(dict.fromkeys(step.at for steps in self.tables[table].values() for step in steps))
+
+    def tables_at(self, stations: Collection[str]) -> list[str]:
+        """The machines that index, of which one of some stations is an end of some command."""
+        return [name for name in self.tables if not self.ends_of(name).isdisjoint(stations)]
+
+    def ends_of(self, table: str) -> set[str]:
+        """All stations of a machine that indexes, also of commands that the net never sends."""
+        own = [action for action in self.model.machines[table].commands.values() if isinstance(action, Index)]
+        return {end for action in own for way in action.following.items() for end in way}
 
     def may_break_off(self, machine: str) -> list[Place]:
         """Those whose command a stop of the machine may break off: not that of a stop, nor one that does nothing; none
         where the machine is always stopped at once."""
         own = [place for place in self.commanding if self.machine_of(place) == machine]
         stops = [place for place in own if isinstance(self.action(place), Stop)]
-        if all(place.name in self.stops for place in stops):
+        if all(place.name in self.momentary for place in stops):
             return []
-        return [place for place in own if place not in stops and not isinstance(self.action(place), Work)]
+        return [place for place in own if place not in stops and not isinstance(self.action(place), Switch | Work)]
 
     @cached_property
     def failing(self) -> tuple[Place, ...]:
@@ -318,7 +378,7 @@ class Things:
     def may_start(self) -> tuple[str, ...]:
         """The machines that may be at a command which they were given while a controller was still to be told of
         something, in the order of the plant file."""
-        some = {self.machine_of(place) for place in self.commanding if place.name not in self.stops}
+        some = {self.machine_of(place) for place in self.commanding if place.name not in self.momentary}
         return tuple(name for name in self.model.machines if self.late and name in some)
 
     @cached_property
@@ -363,6 +423,8 @@ class Things:
         for place in self.commanding:
             if isinstance(action := self.action(place), Carry):
                 yield self.seen_of(action.source, self.machine_of(place)), [place]
+            if isinstance(action, Index):
+                yield from ((self.seen_in(step), [place]) for step in self.steps_of(place))
             effect = self.shows_done(place)
             yield effect if place.completion is None else [(place.completion, True), *effect], [place]
             if place in self.may_break_off(self.machine_of(place)):
@@ -385,12 +447,18 @@ class Things:
         name, action = self.machine_of(place), self.action(place)
         if isinstance(action, Carry):
             return self.seen_of(name, action.target)
+        if isinstance(action, Index):
+            return [one for step in self.steps_of(place) for one in self.seen_in(step)]
         if isinstance(action, Process):
             return [(name, False) for name in self.judging(action.station)]
         if isinstance(action, Grasp | Put):
             station = self.model.machines[name].positions[self.where(place, "at")]
             return self.seen_of(station, name) if isinstance(action, Grasp) else self.seen_of(name, station)
         return []
+
+    def seen_in(self, step: Step) -> list[tuple[str, bool]]:
+        """What sensors show at once where a machine that indexes takes a workpiece, or lays it down."""
+        return self.seen_of(step.at, None) if step.does == "takes" else self.seen_of(None, step.to)
 
     def excludes(self, place: Place, signal: str, value: bool) -> bool:
         """Whether nobody who goes by this value of a signal is ready while a place holds its token, and it holds it

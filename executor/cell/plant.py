@@ -16,13 +16,26 @@ from dataclasses import dataclass, field, replace
 from heapq import heappop, heappush
 from typing import Final
 
-from firable.executor.cell.disturbances import Disturbance, Disturbances, StuckSensor
+from firable.executor.cell.disturbances import Disturbance, Disturbances
+from firable.executor.cell.events import (
+    ArrivalDue,
+    Busy,
+    DepartureDue,
+    Event,
+    FinishDue,
+    LookDue,
+    PressDue,
+    StickDue,
+    SwitchDue,
+    Ticket,
+)
 from firable.nets.machines.plant_file import (
     GOOD,
     Action,
     Carry,
     Clamp,
     Grasp,
+    Index,
     Machine,
     Move,
     PlantModel,
@@ -31,13 +44,11 @@ from firable.nets.machines.plant_file import (
     Release,
     Sensor,
     Stop,
+    Switch,
 )
 
 STILL_DONE: Final = 0.5
 """How often a machine that is brought to rest in some time does what it would have been done with by then."""
-
-Ticket = int
-"""Names one sent command in the plant's answer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,71 +85,6 @@ class Workpiece:
     processed: int = 0
 
 
-@dataclass(frozen=True, slots=True)
-class _Busy:
-    """The command that a machine is at."""
-
-    command: str
-    parameters: Mapping[str, str]
-    ticket: Ticket
-    waits: bool = False
-    """Whether it would be done if its station were not full."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Arrival:
-    """The next workpiece comes."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Departure:
-    """A workpiece at an end is taken away, if it is still there."""
-
-    station: str
-    id: int
-
-
-@dataclass(frozen=True, slots=True)
-class _Finish:
-    """The time of a command is over."""
-
-    machine: str
-    busy: _Busy
-
-
-@dataclass(frozen=True, slots=True)
-class _Press:
-    """Somebody has come to a machine that was stopped, and presses the key."""
-
-    signal: str
-
-
-@dataclass(frozen=True, slots=True)
-class _Switch:
-    """Somebody outside the cell sets a signal, or resets it."""
-
-    signal: str
-
-
-@dataclass(frozen=True, slots=True)
-class _Stick:
-    """A sensor gets stuck: `_seen` looks at the disturbances."""
-
-    stuck: StuckSensor
-
-
-@dataclass(frozen=True, slots=True)
-class _Look:
-    """A camera has looked long enough at what lies on a station."""
-
-    station: str
-    number: int
-    """Of the looks at that station: one that was begun anew since, or has nothing to see any more, finds nothing."""
-
-
-_Event = _Arrival | _Departure | _Finish | _Press | _Switch | _Stick | _Look
-
-
 @dataclass(slots=True)
 class _MachineNow:
     """What a machine holds, where its hand is, and what it is at."""
@@ -146,9 +92,13 @@ class _MachineNow:
     model: Machine
     position: str | None
     holding: Workpiece | None = None
-    busy: _Busy | None = None
-    breaks_off: _Busy | None = None
+    busy: Busy | None = None
+    breaks_off: Busy | None = None
     """The command that it was at when it was stopped, until it has come to rest; one that waits will be done."""
+    indexes: str = ""
+    """The command by which it is in the midst of an index, also where it was halted there."""
+    taken: dict[str, Workpiece] = field(default_factory=dict)
+    """By the stations from which it has taken them, the workpieces that it moves then."""
     times: dict[str, int] = field(default_factory=dict)
 
 
@@ -160,12 +110,12 @@ def _told_apart(workpiece: Workpiece | None) -> Hashable:
     return workpiece and (workpiece.id, workpiece.processed)
 
 
-def _doing(busy: _Busy | None) -> Hashable:
+def _doing(busy: Busy | None) -> Hashable:
     return busy and (busy.command, busy.waits)
 
 
 class Plant:
-    """The cell of a plant file at rest, into which `workpieces` workpieces will come."""
+    """The cell of a plant file at rest, into which `workpieces` workpieces will come, besides those that are there."""
 
     def __init__(
         self, model: PlantModel, *, workpieces: int, seed: int = 0, disturbances: Iterable[Disturbance] = ()
@@ -179,8 +129,7 @@ class Plant:
         self.stations: dict[str, Workpiece | None] = dict.fromkeys(model.stations)
         self.clamped: set[str] = set()
         judging = [sensor for sensor in model.sensors.values() if sensor.judges is not None]
-        actions = (action for machine in model.machines.values() for action in machine.commands.values())
-        self.machines_workpieces = any(isinstance(action, Process) for action in actions)
+        self.machines_workpieces = model.machines_workpieces
         self.likely = {str(one.judges): GOOD for one in judging}
         """How likely a workpiece is to be found good, at each station where that is judged."""
         self.likely |= {str(one.judges): one.good for one in judging if one.good is not None}
@@ -199,17 +148,22 @@ class Plant:
         self.faulted = False
         self.arrival_due = False
         self.is_closed = False
-        self.events: list[tuple[float, int, _Event]] = []
+        self.events: list[tuple[float, int, Event]] = []
         """What will happen: when, a tie breaker, what."""
         self.sequence = 0
         self.now_seconds = 0.0
         if workpieces:
-            self._in(0.0, model.arrivals.jitter_s, _Arrival())
+            self._in(0.0, model.arrivals.jitter_s, ArrivalDue())
         for name, sensor in model.sensors.items():
             if sensor.set_by is not None:
-                self._in(sensor.after_s, 0.0, _Switch(name))
+                self._in(sensor.after_s, 0.0, SwitchDue(name))
         for stuck in self.disturbances.stuck:
-            self._in(stuck.from_seconds, 0.0, _Stick(stuck))
+            self._in(stuck.from_seconds, 0.0, StickDue(stuck))
+        for station, kind in model.full_at_first.items():
+            self.entered += 1
+            self._lies(station, Workpiece(self.entered, processed=int(kind == "machined")))
+        if model.full_at_first:
+            self.shown = {name: self._sees(name, sensor) for name, sensor in model.sensors.items()}
 
     @property
     def next_seconds(self) -> float | None:
@@ -220,7 +174,7 @@ class Plant:
     def at_rest(self) -> bool:
         """Whether nothing happens any more if no command comes, but that signals are set from outside again."""
         return self.faulted or all(
-            isinstance(event, _Switch) and self.model.sensors[event.signal].for_s is not None
+            isinstance(event, SwitchDue) and self.model.sensors[event.signal].for_s is not None
             for *_, event in self.events
         )
 
@@ -228,13 +182,17 @@ class Plant:
     def inside(self) -> tuple[int, ...]:
         """The workpieces in the cell, in the order in which they came."""
         holders = [*self.stations.values(), *(machine.holding for machine in self.machines.values())]
+        holders += [workpiece for machine in self.machines.values() for workpiece in machine.taken.values()]
         return tuple(sorted(workpiece.id for workpiece in holders if workpiece is not None))
 
     @property
     def standing(self) -> Hashable:
         """Where everything is and what the machines are at, whatever the time: equal where nothing has changed."""
         machines = tuple(
-            (machine.position, _told_apart(machine.holding), _doing(machine.busy), _doing(machine.breaks_off))
+            (
+                (machine.position, _told_apart(machine.holding), _doing(machine.busy), _doing(machine.breaks_off)),
+                (machine.indexes, *((station, _told_apart(one)) for station, one in machine.taken.items())),
+            )
             for machine in self.machines.values()
         )
         stations = tuple(map(_told_apart, self.stations.values()))
@@ -271,14 +229,14 @@ class Plant:
         if self.faulted:
             return []
         self.now_seconds = now_seconds
-        return self._lawful(machine, self._begin(machine, _Busy(command, parameters, ticket)))
+        return self._lawful(machine, self._begin(machine, Busy(command, parameters, ticket)))
 
     def advance(self, now_seconds: float) -> list[PlantReport]:
         """Let happen what is due."""
         reports: list[PlantReport] = []
         while self.next_seconds is not None and self.next_seconds <= now_seconds:
             self.now_seconds, _, event = heappop(self.events)
-            reports += self._lawful(event.machine if isinstance(event, _Finish) else "", self._happen(event))
+            reports += self._lawful(event.machine if isinstance(event, FinishDue) else "", self._happen(event))
         return reports
 
     def _lawful(self, machine: str, happening: Iterator[PlantReport]) -> list[PlantReport]:
@@ -292,49 +250,51 @@ class Plant:
         # What is seen comes before what is acknowledged: a completion is formed from both.
         return [*self._seen(), *reports]
 
-    def _in(self, delay_s: float, jitter_s: float, event: _Event) -> None:
+    def _in(self, delay_s: float, jitter_s: float, event: Event) -> None:
         delay = max(0.0, delay_s + (self.random.uniform(-jitter_s, jitter_s) if jitter_s else 0.0))
         heappush(self.events, (self.now_seconds + delay, self.sequence, event))
         self.sequence += 1
 
-    def _happen(self, event: _Event) -> Iterator[PlantReport]:
+    def _happen(self, event: Event) -> Iterator[PlantReport]:
         match event:
-            case _Arrival():
+            case ArrivalDue():
                 self.arrival_due = True
                 self._arrive()
-            case _Departure(station, id_):
+            case DepartureDue(station, id_):
                 self._depart(station, id_)
-            case _Finish(machine, busy):
+            case FinishDue(machine, busy):
                 now = self.machines[machine]
                 if now.busy is busy:
                     yield from self._finish(machine, busy)
                 elif now.breaks_off is busy and (busy.waits or self._is_still_done()):
                     now.breaks_off = replace(busy, waits=not self._take_effect(machine, busy))
-            case _Press(signal):
+            case PressDue(signal):
                 if self.machines[str(self.model.sensors[signal].acknowledges)].busy is None:
                     self.pressed.add(signal)
-            case _Switch(signal):
+            case SwitchDue(signal):
                 self._switch(signal, self.model.sensors[signal])
-            case _Look(station, number):
+            case LookDue(station, number):
                 if number == self.looks[station][0]:
                     self._find(station)
-            case _Stick(stuck):
+            case StickDue(stuck):
                 self.befallen.append((stuck, f"{stuck.signal} is stuck at {int(stuck.value)}"))
 
     def _switch(self, signal: str, sensor: Sensor) -> None:
         self.pressed ^= {signal}
         if sensor.for_s is not None:
-            self._in(sensor.for_s if signal in self.pressed else sensor.after_s, 0.0, _Switch(signal))
+            self._in(sensor.for_s if signal in self.pressed else sensor.after_s, 0.0, SwitchDue(signal))
 
     def _arrive(self) -> None:
         arrivals = self.model.arrivals
-        if self.arrival_due and self.to_come and not self.is_closed and self.stations[arrivals.station] is None:
+        if self._indexing(arrivals.station) or self.stations[arrivals.station] is not None:
+            return
+        if self.arrival_due and self.to_come and not self.is_closed:
             self.arrival_due = False
             self.to_come -= 1
             self.entered += 1
             self._lies(arrivals.station, Workpiece(self.entered))
             if self.to_come:
-                self._in(arrivals.every_s, arrivals.jitter_s, _Arrival())
+                self._in(arrivals.every_s, arrivals.jitter_s, ArrivalDue())
 
     def _depart(self, station: str, id_: int) -> None:
         workpiece, departure = self.stations[station], self.model.departure(station)
@@ -348,7 +308,7 @@ class Plant:
         if not workpiece.processed and self.machines_workpieces and not (departure and departure.raw):
             raise _FaultError(f"workpiece {workpiece.id} leaves the cell without having been machined")
 
-    def _begin(self, name: str, busy: _Busy) -> Iterator[PlantReport]:
+    def _begin(self, name: str, busy: Busy) -> Iterator[PlantReport]:
         machine = self.machines.get(name)
         action = machine.model.commands.get(busy.command) if machine else None
         if machine is None or action is None:
@@ -366,6 +326,9 @@ class Plant:
             return
         if machine.busy is not None:
             raise _FaultError(f"{name} is given {busy.command} while it is at {machine.busy.command}")
+        if isinstance(action, Switch):
+            yield CommandDone(busy.ticket)
+            return
         machine.busy = busy
         self.pressed.difference_update(key for key, _ in self._keys(name))
         match action:
@@ -382,6 +345,8 @@ class Plant:
             case Carry(source=source):
                 if machine.holding is None:  # it holds one where it was stopped on the way
                     machine.holding = self._taken(source, f"{name} is to carry from {source}")
+            case Index() as index:
+                self._take_up(name, busy, index)
             case Process(station=station):
                 workpiece = self._lying(station, f"{name} is to machine on {station}")
                 if station not in self.clamped:
@@ -390,16 +355,53 @@ class Plant:
                     raise _FaultError(f"{name} machines workpiece {workpiece.id} a second time")
         self._take_time(name, busy, action)
 
-    def _take_time(self, name: str, busy: _Busy, action: Action) -> None:
+    def _take_up(self, name: str, busy: Busy, index: Index) -> None:
+        """Take what lies on the stations of an index; one that was halted in the midst of it has that already."""
+        machine = self.machines[name]
+        if machine.indexes:
+            if machine.indexes != busy.command:
+                raise _FaultError(f"{name} is given {busy.command} in the midst of {machine.indexes}")
+            return
+        for station in sorted(machine.model.indexes):
+            if other := self._indexing(station):
+                raise _FaultError(f"{name} is given {busy.command} while {other} moves what lies on {station}")
+        for station in index.following:
+            if station in self.clamped:
+                raise _FaultError(f"{name} is given {busy.command}, and the workpiece on {station} is clamped")
+        machine.indexes = busy.command
+        for station in index.following:
+            if (workpiece := self.stations[station]) is not None:
+                machine.taken[station] = workpiece
+                self._gone(station)
+        self._wake()
+
+    def _lay_all(self, name: str, index: Index) -> None:
+        """Lay down what an index has taken, each on its next station."""
+        machine = self.machines[name]
+        for station, workpiece in machine.taken.items():
+            to = index.following[station]
+            if (there := self.stations[to]) is not None:
+                raise _FaultError(f"{name} moves workpiece {workpiece.id} onto {to}, where workpiece {there.id} lies")
+            self._lies(to, workpiece)
+        machine.taken.clear()
+        machine.indexes = ""
+        self._arrive()
+
+    def _indexing(self, station: str) -> str:
+        """The machine with which a station moves at this time, if it does."""
+        those = (name for name, one in self.machines.items() if one.indexes and station in one.model.indexes)
+        return next(those, "")
+
+    def _take_time(self, name: str, busy: Busy, action: Action) -> None:
         if (hangs := self._hangs(name, busy)) is None:
-            self._in(action.takes_s, action.jitter_s, _Finish(name, busy))
+            self._in(action.takes_s, action.jitter_s, FinishDue(name, busy))
         else:
             self.befallen.append((hangs, f"{name} has {busy.command} and will never end it"))
 
-    def _hangs(self, name: str, busy: _Busy) -> Disturbance | None:
+    def _hangs(self, name: str, busy: Busy) -> Disturbance | None:
         return self.disturbances.hangs(name, busy.command, self.machines[name].times[busy.command])
 
-    def _finish(self, name: str, busy: _Busy) -> Iterator[PlantReport]:
+    def _finish(self, name: str, busy: Busy) -> Iterator[PlantReport]:
         machine = self.machines[name]
         if not self._take_effect(name, busy):
             machine.busy = replace(busy, waits=True)
@@ -411,10 +413,10 @@ class Plant:
         """Let a machine stand: somebody acknowledges later that what a stop was to break off is."""
         machine = self.machines[name]
         for key, sensor in self._keys(name) if machine.breaks_off is not None else ():
-            self._in(sensor.after_s, 0.0, _Press(key))
+            self._in(sensor.after_s, 0.0, PressDue(key))
         machine.busy = machine.breaks_off = None
 
-    def _take_effect(self, name: str, busy: _Busy) -> bool:
+    def _take_effect(self, name: str, busy: Busy) -> bool:
         """Do what a command does in the end, and say whether it is done: on a full station it may have to wait."""
         machine = self.machines[name]
         action = machine.model.commands[busy.command]
@@ -435,6 +437,8 @@ class Plant:
                 if when_full == "wait" and self._full(target):
                     return False
                 self._lay(name, machine, target)
+            case Index() as index:
+                self._lay_all(name, index)
             case Clamp(station=station):
                 self._lying(station, f"{name} clamps on {station}")
                 self.clamped.add(station)
@@ -456,7 +460,7 @@ class Plant:
         """Whether what is broken off is done if its time is over before the machine rests; it is asked once."""
         return self.random.random() < STILL_DONE
 
-    def _position(self, machine: _MachineNow, name: str, busy: _Busy, parameter: str) -> str:
+    def _position(self, machine: _MachineNow, name: str, busy: Busy, parameter: str) -> str:
         position = busy.parameters.get(parameter)
         if position is None or position not in machine.model.positions:
             raise _FaultError(f"{name} does not know the position {position} of {busy.command}")
@@ -488,7 +492,7 @@ class Plant:
             return
         may_go = workpiece.processed or departure.raw or not self.machines_workpieces
         if may_go or station != self.model.arrivals.station:
-            self._in(departure.after_s, 0.0, _Departure(station, workpiece.id))
+            self._in(departure.after_s, 0.0, DepartureDue(station, workpiece.id))
 
     def _gone(self, station: str) -> None:
         self.stations[station] = None
@@ -502,7 +506,7 @@ class Plant:
         number, seconds = self.looks[station]
         self.looks[station] = number + 1, seconds
         if self.stations[station] is not None:  # a look that takes no time is told of behind what made it begin
-            self._in(seconds, 0.0, _Look(station, number + 1))
+            self._in(seconds, 0.0, LookDue(station, number + 1))
 
     def _find(self, station: str) -> None:
         self.found_good[station] = self.random.random() < self.likely[station]
@@ -512,7 +516,7 @@ class Plant:
         for name, machine in self.machines.items():
             for waiting in (machine.busy, machine.breaks_off):
                 if waiting is not None and waiting.waits:
-                    self._in(0.0, 0.0, _Finish(name, waiting))
+                    self._in(0.0, 0.0, FinishDue(name, waiting))
 
     def _full(self, station: str | None) -> bool:
         return station is not None and self.stations[station] is not None
@@ -523,8 +527,11 @@ class Plant:
             raise _FaultError(f"{name} has lost the workpiece that it should lay down")
         if station is None:
             raise _FaultError(f"{name} drops workpiece {workpiece.id} where nothing is")
+        onto = f"{name} pushes workpiece {workpiece.id} onto {station}"
         if (there := self.stations[station]) is not None:
-            raise _FaultError(f"{name} pushes workpiece {workpiece.id} onto {station}, where workpiece {there.id} lies")
+            raise _FaultError(f"{onto}, where workpiece {there.id} lies")
+        if other := self._indexing(station):
+            raise _FaultError(f"{onto} while {other} moves what lies there")
         machine.holding = None
         self._lies(station, workpiece)
 

@@ -78,6 +78,11 @@ class SimulatedDriver:
             self._start(log.end_seconds)
 
     @property
+    def tells_each_sensor(self) -> bool:
+        """Whether some sensors show something before anything happens, so that all are told at the beginning."""
+        return bool(self.plant.model.full_at_first)
+
+    @property
     def at_rest(self) -> bool:
         """Whether no event is scheduled in the plant, but that signals are set from outside again."""
         return self.plant.at_rest
@@ -100,8 +105,9 @@ class SimulatedDriver:
         """Let the plant's events happen when they are due."""
         self.clock, self.listener = clock, listener
         loop = asyncio.get_running_loop()
-        if not self.is_known:  # perhaps it is a controller that has restarted, and knows nothing of its sensors
-            for signal in self.sensors & self.image.keys():
+        # Perhaps it is a controller that has restarted, and knows nothing of its sensors.
+        for signal in self.image if self.tells_each_sensor or not self.is_known else ():
+            if signal in self.sensors:
                 listener.signal(signal, bool(self.image[signal].value), None)
         while True:
             due = self.plant.next_seconds

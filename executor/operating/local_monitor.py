@@ -22,7 +22,7 @@ from firable.executor.operating.monitor import LATENCY_SECONDS, Divergence, Moni
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.machines.fitting import misfits
-from firable.nets.machines.plant_file import Carry, Clamp, Machine, PlantModel, Process, Release, Sensor
+from firable.nets.machines.plant_file import Carry, Clamp, Index, Machine, PlantModel, Process, Release, Sensor
 from firable.semantics.joining import APPLIED
 from firable.semantics.trace import Event, Fired, Noted
 
@@ -153,6 +153,8 @@ def _reached(machine: Machine) -> Iterator[str]:
         match action:
             case Carry(source=source, target=target):
                 yield from (source, target)
+            case Index():
+                yield from action.stations
             case Clamp(station=station) | Process(station=station) | Release(station=station):
                 yield station
             case _:

@@ -60,6 +60,11 @@ class SimulatedCell:
     """None is virtual time, 1.0 real time, 10.0 ten times as fast."""
     disturbances: Iterable[Disturbance] = ()
 
+    @property
+    def going_through(self) -> int:
+        """How many workpieces are to go through the cell: those that will come, and those that are there at first."""
+        return self.workpieces + len(self.plant.full_at_first)
+
 
 @dataclass(frozen=True, slots=True)
 class RunReport:
@@ -171,7 +176,7 @@ def execute(
             files.recorder,
             conduct,
             speed=1.0 if cell.speed is None else cell.speed,
-            is_complete=lambda: len(plant.delivered) == cell.workpieces,
+            is_complete=lambda: len(plant.delivered) == cell.going_through,
             cell=plant,
             journal=files.journal,
             begin_seconds=files.begin_seconds,

@@ -42,7 +42,7 @@ from firable.nets.machines.fitting import misfits
 from firable.nets.machines.laws import Laws, fact
 from firable.nets.machines.loop import ACCIDENT, OVERRUN, PLANT, UNSENT, ClosedLoop, Faults, Sending
 from firable.nets.machines.moment import NOTHING, Case, Literal, Moment, each
-from firable.nets.machines.plant_file import Failure, PlantModel, Stop
+from firable.nets.machines.plant_file import Failure, Index, PlantModel, Stop
 from firable.nets.machines.telling import Telling
 from firable.nets.net import Controller, Net, Place, SignalKind, Transition
 from firable.nets.well_formed import as_name
@@ -229,8 +229,9 @@ class _Closing:
     def bit(self, sensor: str) -> Place:
         """The place of a sensor that is not exact, under the name of its signal where that is no completion."""
         if sensor in self.acknowledged:
-            return fact(f"{PLANT}.{sensor}.sensor", f"the sensor of {sensor}")
-        return Place(sensor, self.net.signal(sensor).owner, description="sensor")
+            return fact(f"{PLANT}.{sensor}.sensor", f"the sensor of {sensor}", marked=self.laws.sees_at_first(sensor))
+        marked = self.laws.sees_at_first(sensor)
+        return Place(sensor, self.net.signal(sensor).owner, marked, description="sensor")
 
     def sensor(self, name: str) -> Literal:
         """The place that shows a sensor, and whether a token means 1."""
@@ -331,9 +332,14 @@ class _Closing:
             # A machine that has failed at a command still obeys a stop.
             may_hang = name in self.failed and not isinstance(self.laws.action(place), Stop)
             working = ((busy, True), (idle, False), *(((self.failed[name], False),) if may_hang else ()))
-            ends = Case(working, ((busy, False), (idle, True))).with_(self.telling.may_end(place))
+            goes_on = Case(working).with_(self.telling.may_end(place))
+            ends = replace(goes_on, leaves=((busy, False), (idle, True)))
             at_work = each(calm, [ends])
             words = self.words(place)
+            if isinstance(action := self.laws.action(place), Index):
+                for step, says, ways in self.laws.indexes(place, action):
+                    moved = chain.from_iterable(map(self.seen, each(each(calm, [goes_on]), ways)))
+                    yield from self.named(step, says, moved, [place])
             done = each(at_work, self.laws.done(place))
             done = [
                 one for moment in done for seen in self.seen(moment) for one in each([seen], self.formed(place, seen))

@@ -13,8 +13,8 @@ from typing import Any, Final
 from pydantic import BaseModel
 
 from firable.nets.diagnostics import Diagnostic, Severity, did_you_mean
-from firable.nets.machines.plant_file import SEEN, PlantModel, Stop
-from firable.nets.net import Net, SignalKind
+from firable.nets.machines.plant_file import SEEN, PlantModel, Stop, Switch
+from firable.nets.net import Command, Net, Place, SignalKind
 from firable.nets.source import quoted
 from firable.nets.yaml_tree import Path
 from firable.nets.yaml_writing import scalar
@@ -96,12 +96,13 @@ def _difference(one: Any, other: Any, path: Path) -> Path | None:
     return None if one == other else path
 
 
-_WORK: Final = "{does: work, takes_s: 1}"
-
-
-def _add(written: str) -> str:
-    """The hint on what a plant file lacks: what nobody looks for there, such as a lamp, is work like any other."""
-    return f"add it to the plant file, as `{written}` where it concerns no workpiece: a lamp, a door"
+def _lacks(place: Place, command: Command, *, machine: bool = False) -> str:
+    """The hint on a command that a plant file lacks, or whose machine: what nobody looks for there is said at once."""
+    does, such = ("{does: work, takes_s: 1}", "a door") if place.completion else ("{does: switch}", "a lamp, a horn")
+    written = f"{scalar(command.command)}: {does}"
+    if machine:
+        written = f"{scalar(command.machine)}: {{commands: {{{written}}}}}"
+    return f"add it to the plant file, as `{written}` where it concerns no workpiece: {such}"
 
 
 def _misfits_of_places(model: PlantModel, net: Net) -> Iterator[Diagnostic]:
@@ -112,17 +113,20 @@ def _misfits_of_places(model: PlantModel, net: Net) -> Iterator[Diagnostic]:
         sent = f"'{place.name}' sends '{command}'"
         known = model.machines.get(command.machine)
         if known is None:
-            written = f"{scalar(command.machine)}: {{commands: {{{scalar(command.command)}: {_WORK}}}}}"
-            hint = did_you_mean(command.machine, list(model.machines)) + _add(written)
+            hint = did_you_mean(command.machine, list(model.machines)) + _lacks(place, command, machine=True)
             message = f"{sent}, and the plant has no such machine '{command.machine}'"
             yield model.misfit(("machines",), subject, message, hint)
             continue
         inner = ("machines", command.machine, "commands", command.command)
         if command.command not in known.commands:
-            hint = did_you_mean(command.command, list(known.commands)) + _add(f"{scalar(command.command)}: {_WORK}")
+            hint = did_you_mean(command.command, list(known.commands)) + _lacks(place, command)
             yield model.misfit(inner, subject, f"{sent}, and the plant has no such command '{command.command}'", hint)
             continue
         action, parameters = known.commands[command.command], dict(command.parameters)
+        if isinstance(action, Switch) and place.completion is not None:
+            hint = "leave out `until` in the net, or write `does: work` and how long it takes"
+            message = f"{sent} and waits for '{place.completion}', and nothing comes back of what is switched"
+            yield model.misfit(inner, subject, message, hint)
         needed = {"move": "to", "grasp": "at", "put": "at"}.get(action.does)
         if needed and parameters.get(needed) not in known.positions:
             message = f"{sent}: '{needed}' is no position of '{command.machine}'"

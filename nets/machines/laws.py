@@ -11,6 +11,10 @@ A command acts at two instants. It is *sent*: what it wants is checked, and a co
 lies any time. A stop at once leaves undone what the machine is at. One that lasts *breaks it off*: until the machine
 has come to rest that may still have its effect, unacknowledged, or end in its accident.
 
+An index moves many workpieces at once, each of which may be there or not: as one firing that would be a way for each
+set of them. So they are taken one after the other once it is sent, and then laid down one after the other before it is
+done, in *steps* of the machine. It is steady before and after; in between nobody else may lay anything down there.
+
 Workpieces are told apart by one bit, whether they were machined; simulation has identities, which would make the number
 of markings grow with the number of workpieces and which no law asks for. On a station that a sensor judges by `passes`
 or `fails` a workpiece is found good or not some time after it has come, and anew after it was machined there; which of
@@ -22,6 +26,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 
 from firable.nets.machines.loop import ACCIDENT, OVERRUN, PLANT
 from firable.nets.machines.moment import Case, Literal
@@ -31,6 +36,7 @@ from firable.nets.machines.plant_file import (
     Clamp,
     Departure,
     Grasp,
+    Index,
     Machine,
     Move,
     PlantModel,
@@ -38,6 +44,7 @@ from firable.nets.machines.plant_file import (
     Put,
     Release,
     Stop,
+    Switch,
     Work,
 )
 from firable.nets.net import Command, Net, Place
@@ -63,8 +70,7 @@ class Laws:
     @cached_property
     def kinds(self) -> tuple[str, ...]:
         """What a workpiece can be."""
-        commands = (action for machine in self.model.machines.values() for action in machine.commands.values())
-        return (_RAW, _MACHINED) if any(isinstance(action, Process) for action in commands) else (_RAW,)
+        return (_RAW, _MACHINED) if self.model.machines_workpieces else (_RAW,)
 
     @cached_property
     def clamps(self) -> frozenset[str]:
@@ -81,6 +87,11 @@ class Laws:
         """The stations where a workpiece is found good, or not."""
         return frozenset(sensor.judges for sensor in self.model.sensors.values() if sensor.judges is not None)
 
+    def sees_at_first(self, signal: str) -> bool:
+        """Whether the sensor of a signal sees a workpiece as long as nothing has happened."""
+        sensor = self.model.sensors.get(signal)
+        return sensor is not None and sensor.occupied in self.model.full_at_first
+
     def machine(self, place: Place) -> tuple[str, Machine]:
         """The machine that a place commands."""
         name = _command(place).machine
@@ -91,9 +102,11 @@ class Laws:
         return self.machine(place)[1].commands[_command(place).command]
 
     def lasts(self, place: Place) -> bool:
-        """Whether the machine is at the command of a place for a while: of all but a stop at once, of which nobody
-        waits for the end."""
+        """Whether the machine is at the command of a place for a while: not where it switches an output, nor stops at
+        once and nobody waits for the end."""
         action = self.action(place)
+        if isinstance(action, Switch):
+            return False
         return not isinstance(action, Stop) or place.completion is not None or action.takes_s + action.jitter_s > 0
 
     def busy(self, place: Place) -> str:
@@ -112,7 +125,7 @@ class Laws:
         for machine in self.model.machines:
             own = [(place, self.action(place)) for place in self.commanding if self.machine(place)[0] == machine]
             if any(isinstance(action, Stop) and self.lasts(place) for place, action in own):
-                found[machine] = tuple(place for place, action in own if not isinstance(action, (Stop, Work)))
+                found[machine] = tuple(place for place, action in own if not isinstance(action, (Stop, Switch, Work)))
         return {machine: places for machine, places in found.items() if places}
 
     def breaks_off(self, place: Place) -> str:
@@ -122,6 +135,31 @@ class Laws:
     def breaks_off_nothing(self, machine: str) -> str:
         """The place that says that nothing that was broken off at a machine may still be done."""
         return f"{PLANT}.{as_name(machine)}.breaks_off_nothing"
+
+    @cached_property
+    def indexing(self) -> dict[str, dict[str, Index]]:
+        """For each machine that the net lets index, the commands by which it does."""
+        found: dict[str, dict[str, Index]] = {}
+        for place in self.commanding:
+            if isinstance(action := self.action(place), Index):
+                found.setdefault(self.machine(place)[0], {})[_command(place).command] = action
+        return {name: found[name] for name in self.model.machines if name in found}
+
+    def indexed_by(self, *stations: str) -> tuple[str, ...]:
+        """The machines of which one of some stations moves as they index."""
+        return tuple(name for name in self.indexing if not self.model.machines[name].indexes.isdisjoint(stations))
+
+    def steady(self, machine: str) -> str:
+        """The place that says that a machine which can index is not in the midst of that."""
+        return f"{PLANT}.{as_name(machine)}.steady"
+
+    def step(self, machine: str, command: str, does: str, station: str) -> str:
+        """The place that says that a machine which indexes `takes` next what lies on a station, or `lays` it down."""
+        return f"{PLANT}.{as_name(machine)}.{as_name(command)}.{does}.{as_name(station)}"
+
+    def taken_from(self, machine: str, station: str, kind: str = "nothing") -> str:
+        """The place that says of which kind the workpiece is that a machine has from a station as it indexes."""
+        return f"{PLANT}.{as_name(machine)}.from.{as_name(station)}.{kind}"
 
     def hand_at(self, machine: str, position: str) -> str:
         """The place that says where a hand is."""
@@ -147,11 +185,11 @@ class Laws:
         """The places of machines and stations, as they are when all is at rest and no workpiece has come."""
 
         def holding(holder: str) -> Iterator[Place]:
-            held = isinstance(self.model.machines.get(holder), Machine)
-            yield fact(self.empty(holder), f"{holder} {'holds nothing' if held else 'is empty'}", marked=True)
+            held, first = holder in self.model.machines, self.model.full_at_first.get(holder)
+            yield fact(self.empty(holder), f"{holder} {'holds nothing' if held else 'is empty'}", marked=not first)
             for kind in self.kinds:
                 words = f"{holder} holds a {kind} workpiece" if held else f"a {kind} workpiece lies on {holder}"
-                yield fact(self.has(holder, kind), words)
+                yield fact(self.has(holder, kind), words, marked=kind == first)
 
         for name, machine in self.model.machines.items():
             yield fact(self.idle(name), f"{name} is idle", marked=True)
@@ -171,6 +209,8 @@ class Laws:
                 )
             if machine.holds:
                 yield from holding(name)
+            if name in self.indexing:
+                yield from self._index_places(name)
         for station in self.model.stations:
             yield from holding(station)
             if station in self.clamps:
@@ -180,6 +220,18 @@ class Laws:
                 yield fact(self.verdict(station, good=False), f"the workpiece on {station} was not found good")
         yield fact(OVERRUN, "a machine was given a command while it was at another")
         yield fact(ACCIDENT, "something happened that must not")
+
+    def _index_places(self, name: str) -> Iterator[Place]:
+        yield fact(self.steady(name), f"{name} is not in the midst of an index", marked=True)
+        for command, index in self.indexing[name].items():
+            for at in index.following:
+                yield fact(self.step(name, command, "takes", at), f"{name} is to take what lies on {at}")
+            for at, to in index.following.items():
+                yield fact(self.step(name, command, "lays", at), f"{name} is to lay what lay on {at} on {to}")
+        for at in dict.fromkeys(at for index in self.indexing[name].values() for at in index.following):
+            yield fact(self.taken_from(name, at), f"{name} has nothing from {at}", marked=True)
+            for kind in self.kinds:
+                yield fact(self.taken_from(name, at, kind), f"{name} has a {kind} workpiece from {at}")
 
     # --- A command is sent
 
@@ -203,8 +255,20 @@ class Laws:
                 )
             case Process(station=station):
                 yield Case((*free, (self.clamped(station), True), (self.has(station, _RAW), True)), taken)
+            case Index() as index:
+                steady, first = self.steady(name), self.steps(place)[0]
+                loose = tuple((self.clamped(at), False) for at in index.following if at in self.clamps)
+                calm = tuple((self.steady(other), True) for other in self._beside(name))
+                wants = (*free, (steady, True), (first, False), *loose, *calm)
+                yield Case(wants, (*taken, (steady, False), (first, True)))
+            case Switch():
+                yield Case(((self.idle(name), True),))
             case _:
                 yield Case(free, taken)
+
+    def _beside(self, machine: str) -> tuple[str, ...]:
+        """The other machines that index at one of the same stations."""
+        return tuple(other for other in self.indexed_by(*self.model.machines[machine].indexes) if other != machine)
 
     def _stopped(self, name: str, place: Place) -> Iterator[Case]:
         """Whatever a machine is at ends, or is broken off; then it is at the stop for a while, or idle at once."""
@@ -291,6 +355,14 @@ class Laws:
                     f"{name}-again",
                     f"{told}, and no raw workpiece lies on {station}",
                 )
+            case Index() as index:
+                rests: tuple[Literal, ...] = (idle, (self.steady(name), True))
+                for station in (at for at in index.following if at in self.clamps):
+                    words = f"{told}, and the workpiece on {station} is clamped"
+                    yield self._accident((*rests, (self.clamped(station), True)), f"{name}-clamped-{station}", words)
+                for other in self._beside(name):
+                    words = f"{told} while {other} is in the midst of its index"
+                    yield self._accident((*rests, (self.steady(other), False)), f"{name}-meets-{other}", words)
             case _:
                 pass
 
@@ -316,9 +388,11 @@ class Laws:
                     yield from (Case(loose).with_(moved) for moved in self._moved(station, name))
             case Put():
                 if (station := self.station(place)) is not None:
-                    yield from self._moved(name, station)
+                    yield from self._laid_down(name, station)
             case Carry(target=target):
-                yield from self._moved(name, target)
+                yield from self._laid_down(name, target)
+            case Index():
+                yield Case(((self.steady(name), True),))
             case Clamp(station=station):
                 fixed, lies = self.clamped(station), (self.empty(station), False)
                 yield Case(((fixed, False), lies), ((fixed, True),))
@@ -334,8 +408,48 @@ class Laws:
                 yield Case(((fixed, False),), tag="again")
             case Stop():
                 yield from self._at_rest(name)
-            case Work():
+            case Work() | Switch():
                 yield Case()
+
+    def steps(self, place: Place) -> tuple[str, ...]:
+        """The places of the steps of an index, one after the other, and the one that says that all are done."""
+        machine, command = self.machine(place)[0], _command(place).command
+        stations = self.indexing[machine][command].following
+        taking, laying = ([self.step(machine, command, does, at) for at in stations] for does in ("takes", "lays"))
+        return (*taking, *laying, self.steady(machine))
+
+    def indexes(self, place: Place, index: Index) -> Iterator[tuple[str, str, tuple[Case, ...]]]:
+        """The steps of the index that a place commands: a name, words, and the ways in which each can go."""
+        machine, stations, steps = self.machine(place)[0], index.following, self.steps(place)
+        moves = (("takes", at) for at in stations), (("lays", at) for at in stations)
+        for (does, at), step, next_ in zip(chain(*moves), steps, steps[1:], strict=False):
+            goes_on = Case(((step, True), (next_, False)), ((step, False), (next_, True)))
+            if does == "takes":
+                words, none = f"{machine} takes what lies on {at}", self.empty(at)
+                ways = self._taken_up(machine, at)
+            else:
+                words, none = f"{machine} lays what lay on {at} on {stations[at]}", self.taken_from(machine, at)
+                ways = self._indexed(machine, at, stations[at])
+            name = f"{as_name(machine)}/{does}/{place.name}/{as_name(at)}"
+            yield name, words, tuple(map(goes_on.with_, (Case(((none, True),), tag="nothing"), *ways)))
+
+    def _taken_up(self, machine: str, station: str) -> Iterator[Case]:
+        for kind in self.kinds:
+            nothing, taken = self.taken_from(machine, station), self.taken_from(machine, station, kind)
+            wants = ((self.has(station, kind), True), (self.empty(station), False), (nothing, True), (taken, False))
+            moved = Case(wants, _turned(wants), self._tag(kind))
+            yield from map(moved.with_, self._judged_no_more(station))
+
+    def _indexed(self, machine: str, station: str, to: str) -> Iterator[Case]:
+        for kind in self.kinds:
+            nothing, taken = self.taken_from(machine, station), self.taken_from(machine, station, kind)
+            wants = ((taken, True), (nothing, False), (self.empty(to), True), (self.has(to, kind), False))
+            yield Case(wants, _turned(wants), self._tag(kind))
+
+    def _laid_down(self, machine: str, station: str) -> Iterator[Case]:
+        """A machine lays its workpiece down on a station, where nobody is in the midst of an index."""
+        steady = Case(tuple((self.steady(other), True) for other in self.indexed_by(station)))
+        yield from map(steady.with_, self._moved(machine, station))
 
     def spoiled(self, place: Place) -> Iterator[Case]:
         """The accidents that a command can end in."""
@@ -356,22 +470,28 @@ class Laws:
                 station = self.station(place)
                 if station is None:
                     yield self._accident((), "drops", f"{name} drops its workpiece where nothing is")
-                elif when_full == "collide":
-                    yield self._collides(name, station)
+                else:
+                    yield from self._collides(name, station, when_full)
             case Carry(target=target, when_full=when_full):
-                if when_full == "collide":
-                    yield self._collides(name, target)
+                yield from self._collides(name, target, when_full)
+            case Index() as index:
+                for at, to in index.following.items():
+                    lays: Literal = (self.step(name, _command(place).command, "lays", at), True)
+                    both = ((self.taken_from(name, at), False), (self.empty(to), False))
+                    words = f"{name} moves the workpiece of {at} onto {to}, where another lies"
+                    yield self._accident((lays, *both), f"collides-{to}", words)
             case Clamp(station=station) | Process(station=station):
                 words = f"{name} does {_words(place)} on {station}, where no workpiece lies"
                 yield self._accident(((self.empty(station), True),), "nothing", words)
-            case Move() | Release() | Work() | Stop():
+            case Move() | Release() | Work() | Switch() | Stop():
                 return
 
     def arrives(self) -> Case:
-        """A workpiece comes."""
+        """A workpiece comes; nobody brings one to a station while a machine indexes there."""
         station = self.model.arrivals.station
         raw, empty = self.has(station, _RAW), self.empty(station)
-        return Case(((empty, True), (raw, False)), ((empty, False), (raw, True)))
+        steady = tuple((self.steady(machine), True) for machine in self.indexed_by(station))
+        return Case(((empty, True), (raw, False), *steady), ((empty, False), (raw, True)))
 
     def judges(self, station: str) -> Iterator[Case]:
         """A workpiece that lies on a station, and is not judged yet, is found good or not."""
@@ -417,7 +537,7 @@ class Laws:
                 (self.empty(target), True),
                 (self.has(target, kind), False),
             )
-            moved = Case(wants, tuple((place, not value) for place, value in wants), self._tag(kind))
+            moved = Case(wants, _turned(wants), self._tag(kind))
             yield from map(moved.with_, self._judged_no_more(source))
 
     def _judged_no_more(self, holder: str) -> Iterator[Case]:
@@ -433,12 +553,24 @@ class Laws:
     def _tag(self, kind: str) -> str:
         return kind if len(self.kinds) > 1 else ""
 
-    def _collides(self, machine: str, station: str) -> Case:
-        words = f"{machine} pushes its workpiece onto {station}, where another lies"
-        return self._accident(((self.empty(station), False), (self.empty(machine), False)), "collides", words)
+    def _collides(self, machine: str, station: str, when_full: str) -> Iterator[Case]:
+        """What pushes a workpiece onto another one; or, where it waits for that to go, onto a station that moves."""
+        holds: Literal = (self.empty(machine), False)
+        onto = f"{machine} pushes its workpiece onto {station}"
+        if when_full == "collide":
+            yield self._accident(((self.empty(station), False), holds), "collides", f"{onto}, where another lies")
+        for other in self.indexed_by(station):
+            words = f"{onto} while {other} is in the midst of its index"
+            moves: tuple[Literal, ...] = ((self.empty(station), True), (self.steady(other), False))
+            yield self._accident((*moves, holds), f"meets-{other}", words)
 
     def _accident(self, wants: tuple[Literal, ...], tag: str, says: str, kind: str = ACCIDENT) -> Case:
         return Case(((kind, False), *wants), ((kind, True),), tag, says)
+
+
+def _turned(wants: tuple[Literal, ...]) -> tuple[Literal, ...]:
+    """What is left where all that was wanted becomes otherwise."""
+    return tuple((place, not value) for place, value in wants)
 
 
 def fact(name: str, description: str, *, marked: bool = False) -> Place:

@@ -18,11 +18,11 @@ machines than a net commands, the file is at fault as well: a plant remembers wh
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from enum import StrEnum
 from math import isclose
 from pathlib import Path as FilePath
-from typing import Annotated, Final, Literal, get_args
+from typing import Annotated, ClassVar, Final, Literal, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, ValidationError
 
@@ -136,6 +136,32 @@ class Work(_Timed):
     does: Literal["work"]
 
 
+class Index(_Timed):
+    """Move every workpiece to the next station at once, as an index table or a walking beam does.
+
+    `next` says of each station which one that is; round in a circle, if the last leads to the first. The workpieces are
+    taken up as the command is sent, and lie on the next stations when it is done; one that lies there already is
+    collided with. Until then nobody else may lay anything on a station of the machine, or take anything from it.
+    """
+
+    does: Literal["index"]
+    following: dict[Name, Name] = Field(alias="next", min_length=1)
+
+    @property
+    def stations(self) -> tuple[str, ...]:
+        """The stations that it moves workpieces from or to."""
+        return tuple(dict.fromkeys((*self.following, *self.following.values())))
+
+
+class Switch(_Model):
+    """Switch an output that moves nothing and answers nothing, a lamp or a horn; it is done as it is sent."""
+
+    does: Literal["switch"]
+    takes_s: ClassVar[float] = 0.0
+    jitter_s: ClassVar[float] = 0.0
+    may_fail: ClassVar[None] = None
+
+
 class Stop(_Model):
     """Stop whatever the machine does; at once, or, with `takes_s`, as long as it takes to come to rest.
 
@@ -149,7 +175,7 @@ class Stop(_Model):
 
 
 Action = Annotated[
-    Move | Grasp | Put | Carry | Clamp | Process | Release | Work | Stop,
+    Move | Grasp | Put | Carry | Index | Clamp | Process | Release | Work | Switch | Stop,
     Field(discriminator="does"),
 ]
 _ACTIONS: Final[tuple[type[BaseModel], ...]] = get_args(get_args(Action)[0])
@@ -166,6 +192,13 @@ class Machine(_Model):
     def holds(self) -> bool:
         """Whether it can hold a workpiece: in its hand, or while it carries one."""
         return self.hand is not None or any(isinstance(action, Carry) for action in self.commands.values())
+
+    @property
+    def indexes(self) -> frozenset[str]:
+        """The stations that move as it indexes, by whichever command: it is one table, or one beam."""
+        return frozenset(
+            station for action in self.commands.values() if isinstance(action, Index) for station in action.stations
+        )
 
 
 class Arrivals(_Model):
@@ -246,6 +279,9 @@ class PlantModel(_Model):
     plant: Name = Field(description="The cell of the net.")
     description: str = ""
     stations: list[Name]
+    full_at_first: dict[Name, Literal["raw", "machined"]] = Field(
+        default={}, description="The stations where a workpiece lies at first, and whether it was machined."
+    )
     arrivals: Arrivals
     departures: Annotated[
         list[Departure],
@@ -255,6 +291,11 @@ class PlantModel(_Model):
     machines: dict[Name, Machine]
     sensors: dict[Name, Sensor] = {}
     _read: tuple[Source, Node] | None = PrivateAttr(default=None)
+
+    @property
+    def machines_workpieces(self) -> bool:
+        """Whether some machine machines workpieces; else all are finished as they come."""
+        return any(isinstance(one, Process) for machine in self.machines.values() for one in machine.commands.values())
 
     def departure(self, station: str) -> Departure | None:
         """How workpieces are taken away at a station, if they are."""
@@ -348,6 +389,9 @@ def _inconsistencies(model: PlantModel) -> Iterator[tuple[Path, str, str]]:
         yield from station(("departures", i, "station"), end)
         if end in ends[:i]:
             yield ("departures", i), f"workpieces leave at '{end}' by an earlier entry", "write each station once"
+    for full, kind in model.full_at_first.items():
+        yield from station(("full_at_first", full), full)
+        yield from _contradicted(model, full, kind)
     for name, machine in model.machines.items():
         path = ("machines", name)
         if name == "safe":
@@ -368,6 +412,15 @@ def _inconsistencies(model: PlantModel) -> Iterator[tuple[Path, str, str]]:
                 case Carry(source=source, target=target):
                     yield from station((*inner, "from"), source)
                     yield from station((*inner, "to"), target)
+                case Index():
+                    for leaves, comes in action.following.items():
+                        yield from station((*inner, "next", leaves), leaves)
+                        yield from station((*inner, "next", leaves), comes)
+                    yield from _meeting((*inner, "next"), action.following)
+                    if any(isinstance(one, Stop) for one in machine.commands.values()):
+                        message = f"'{name}' has a `stop`, too, which could leave workpieces between two stations"
+                        hint = "leave out the `stop`: `within` of a place tells of an `index` that is not done in time"
+                        yield inner, message, hint
                 case Clamp(station=at) | Process(station=at) | Release(station=at):
                     yield from station((*inner, "station"), at)
     for name, sensor in model.sensors.items():
@@ -403,6 +456,30 @@ def _inconsistencies(model: PlantModel) -> Iterator[tuple[Path, str, str]]:
             hint = "a machine with `hand`, or with a command that does `carry`, holds workpieces"
             yield ("sensors", name, "holding"), f"'{sensor.holding}' never holds anything", hint
     yield from _disagreements(model)
+
+
+def _contradicted(model: PlantModel, at: str, kind: str) -> Iterator[tuple[Path, str, str]]:
+    """What else the file says of a station where a workpiece lies at first, which cannot be so, too."""
+    path, departure = ("full_at_first", at), model.departure(at)
+    if at == model.arrivals.station:
+        hint = "leave it out: one that lies there is the first that comes"
+        yield path, f"workpieces come to '{at}', and each only when it is empty", hint
+    elif kind == "machined" and not model.machines_workpieces:
+        yield path, "no machine of the cell machines workpieces: none does `process`", "write `raw`"
+    elif kind == "raw" and model.machines_workpieces and departure is not None and not departure.raw:
+        hint = "write `machined` here, or `raw: true` of the departure"
+        yield path, f"workpieces leave at '{at}', and none may leave without having been machined", hint
+
+
+def _meeting(path: Path, following: Mapping[str, str]) -> Iterator[tuple[Path, str, str]]:
+    """Stations that lead to themselves, or two to one, where workpieces would meet."""
+    first: dict[str, str] = {}
+    for at, to in following.items():
+        if to == at:
+            yield (*path, at), "a workpiece that is moved comes to another station", "leave the station out if it stays"
+        elif (other := first.setdefault(to, at)) != at:
+            message = f"workpieces from '{other}' and from '{at}' would meet at '{to}'"
+            yield (*path, at), message, "give each station a next one of its own"
 
 
 def _no_names(model: PlantModel) -> Iterator[tuple[Path, str, str]]:

@@ -41,7 +41,7 @@ from firable.nets.machines.excluding import Excluding
 from firable.nets.machines.laws import Laws, fact
 from firable.nets.machines.loop import PLANT
 from firable.nets.machines.moment import Case, Literal, Moment, each
-from firable.nets.machines.plant_file import Carry, Grasp, Process, Put, Stop
+from firable.nets.machines.plant_file import Carry, Grasp, Index, Process, Put, Stop
 from firable.nets.net import Place, SignalKind
 from firable.nets.well_formed import as_name
 
@@ -95,7 +95,7 @@ class Telling:
     def told_late(self, changes: Collection[Change], places: Collection[Place] = ()) -> frozenset[str]:
         """Which of some signals that change together are told late: those that each close a gate and are not set from
         outside, and completions behind them. `places` are those whose commands are sent then, or the one whose command
-        is done."""
+        is done, or goes on."""
         closing = {
             signal
             for signal, value in changes
@@ -122,9 +122,12 @@ class Telling:
         return found
 
     def _by(self, place: Place) -> Iterator[list[Change]]:
-        """What changes together as the command of a place is sent, and as it is done."""
-        if isinstance(action := self.laws.action(place), Carry):
-            yield [*self._seen(action.source, self.laws.machine(place)[0])]
+        """What changes together as the command of a place is sent, as its machine goes on, and as it is done."""
+        match self.laws.action(place):
+            case Carry(source=source):
+                yield [*self._seen(source, self.laws.machine(place)[0])]
+            case Index() as index:
+                yield from self._indexed(index)
         yield self._done(place)
 
     def _done(self, place: Place) -> list[Change]:
@@ -141,6 +144,8 @@ class Telling:
                 yield from self._seen(name, self.laws.station(place))
             case Carry(target=target):
                 yield from self._seen(name, target)
+            case Index() as index:
+                yield from chain.from_iterable(self._indexed(index))
             case Process(station=station):
                 yield from ((signal, False) for signal in self._judging(station))
             case _:
@@ -162,6 +167,11 @@ class Telling:
                 yield [(signal.name, True)]
             if sensor.by_hand or sensor.may_flicker or sensor.may_linger:
                 yield [(signal.name, False)]
+
+    def _indexed(self, index: Index) -> Iterator[list[Change]]:
+        """What changes with each step of an index."""
+        yield from ([*self._seen(station, None)] for station in index.following)
+        yield from ([*self._seen(None, station)] for station in index.following.values())
 
     def _seen(self, source: str | None, target: str | None) -> Iterator[Change]:
         """What sensors see at once of a workpiece that goes from one to the other."""
@@ -226,8 +236,9 @@ class Telling:
     def places(self) -> Iterator[Place]:
         """What controllers were told of signals that are told late, and of which there is news."""
         for signal in self.late:
-            yield fact(_told(signal), f"the controller was told that {signal} is 1")
-            yield fact(_told(signal, value=False), f"the controller was told that {signal} is 0", marked=True)
+            shows = signal not in self.completions and self.laws.sees_at_first(signal)
+            yield fact(_told(signal), f"the controller was told that {signal} is 1", marked=shows)
+            yield fact(_told(signal, value=False), f"the controller was told that {signal} is 0", marked=not shows)
             yield fact(_news(signal), f"{signal} has changed, and its controller is still to be told")
         if self.starting:
             yield fact(_UNTOLD, "a controller is still to be told of something")

@@ -330,6 +330,11 @@ def test_commands_of_a_device_that_was_never_reached_are_counted_as_issued_and_n
             "nothing is held when 'R.PUT' ends; name one of R.",
         ),
         (["sim", "catalogue:one_robot", "--modbus", "--drop", "MC.CLAMP#2"], "nothing is held when 'MC.CLAMP' ends"),
+        (["sim", "catalogue:index_table", "--modbus", "--drop", "T.INDEX"], "no command of this cell ends so"),
+        (
+            ["sim", "catalogue:index_table", "--modbus", "--hang", "L.DARK"],
+            "'L.DARK' is done as it is sent",
+        ),
         (["sim", "catalogue:one_robot", "--modbus", "--hang", "R.MOVE#0"], "'R.MOVE#0' never comes"),
         (["sim", "catalogue:philosophers-3", "--modbus"], "name the plant file of the cell with --plant"),
         (

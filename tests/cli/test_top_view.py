@@ -108,6 +108,22 @@ def test_a_workpiece_goes_through_the_cell_and_out_of_it() -> None:
     assert stage.of_json(scene.to_json()) == scene
 
 
+def test_an_index_moves_all_workpieces_that_are_known_to_lie_there_one_of_which_lay_there_at_first() -> None:
+    stage = Stage(catalogue_net("index_table"), plant("index_table"))
+    scene, seen = stage.begin(), []
+    assert [(piece.number, piece.on, piece.machined) for piece in scene.pieces] == [(1, "unload", True)]
+    for name in ("", "G1", "t1-a", "G3", "t1-b", "t2-a", "t2-c", "t2-d", "t2-e", "", "G2", "t1-a", "G3"):
+        # A workpiece comes to the load station, which its sensor tells.
+        scene = stage.fired(scene, (name,), sends=True) if name else stage.signal(scene, "table.part_at_load")
+        seen.append({piece.number: (piece.on, piece.machined) for piece in scene.pieces})
+    assert seen[0] == {1: ("unload", True), 2: ("load", False)}
+    assert seen[2] == {2: ("load", False)}
+    assert seen[3] == {2: ("drill", False)}
+    assert seen[9] == {2: ("drill", True), 3: ("load", False)}
+    assert seen[12] == {2: ("unload", True), 3: ("drill", False)}
+    assert stage.of_json(scene.to_json()) == scene
+
+
 def test_a_command_that_is_left_before_its_completion_has_no_effect() -> None:
     stage = Stage(catalogue_net("one_robot_timed"), plant("one_robot_timed"))
     fault = next(t for t in stage.net.transitions if t.name == "robot.to_cv1_timeout")

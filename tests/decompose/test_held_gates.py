@@ -21,7 +21,10 @@ from firable.nets.verdict import Status
 from firable.semantics.player import Player
 
 LINGERS = "o4.G1/conveyor.part_at_entry"
-CELLS = ["one_robot", "one_robot_mc_late", "one_robot_mc_late_capacity", "two_robots_shared", "two_robots_separate"]
+CELLS = [
+    *("one_robot", "one_robot_mc_late", "one_robot_mc_late_capacity"),
+    *("two_robots_shared", "two_robots_separate", "index_table"),
+]
 
 
 def plant_with(old: str, new: str) -> PlantModel:
@@ -386,6 +389,23 @@ def test_in_two_cells_a_robot_that_does_not_wait_meets_the_workpiece_that_a_late
         accident = space.marked(loop.net.place_index[ACCIDENT])
         found.append((space.complete, space.count(accident) > 0))
     assert found == [(True, False), (True, False), (True, True)]
+
+
+def test_a_drill_that_votes_on_what_has_come_may_have_looked_while_the_table_was_turning() -> None:
+    """Its station is empty then, and the table is asked later whether it has turned."""
+    text = catalogue_path("index_table").read_text("utf-8")
+    third, looks = text[text.index("  G3:") : text.index("  t1-a:")], "{from: drill.looking,"
+    fourth = third.replace("G3:", "G4:").replace("drill.looking]", "drill.empty]\n    unless: drill.part_there")
+    gated = third.replace("drill.looking]", "drill.clamping]\n    if: drill.part_there") + fourth
+    without = "".join(line for line in text.splitlines(keepends=True) if looks not in line and "looking:" not in line)
+    net = parse_net(without.replace(third, gated))
+    found = {verdict.name: verdict for verdict in held_gates(split(net), catalogue_plant("index_table")).verdicts}
+    broken = {name: verdict.status for name, verdict in found.items() if not verdict.holds}
+    assert broken == {f"o4.{name}/drill.part_there": Status.VIOLATED for name in ("G3", "G4")}
+    witness = found["o4.G4/drill.part_there"].witness
+    assert witness is not None
+    assert "T/lays/table.turning/load/raw" in witness.firings[-2][0]
+    assert witness.firings[-1][0].startswith("drill.part_there/told/rises")
 
 
 def test_the_verdicts_leave_evidence_that_the_checker_confirms(monkeypatch: pytest.MonkeyPatch) -> None:

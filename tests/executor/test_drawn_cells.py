@@ -6,13 +6,13 @@ engineers think of has examples beside it (`test_runs_of_the_loop.py`); here are
 
 import io
 import random
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
 import pytest
-from support.drawn_cells import DrawnCell, drawn_cell
+from support.drawn_cells import DrawnCell, drawn_cell, drawn_table
 from support.examples import seeds
 from support.following import Course, Follower, TooManyMarkingsError
 
@@ -93,6 +93,7 @@ def run(cell: DrawnCell, seed: int, *, faults: Faults = Faults.NONE) -> Run:
             SimulatedCell(cell.plant, workpieces=workpieces, seed=seed, disturbances=disturbances),
             Conduct(trace=stream, overdue_seconds=OVERDUE_SECONDS, watch=Watch.IGNORE),
         )
+    workpieces += len(cell.plant.full_at_first)
     return Run(tuple(parse_trace(stream.getvalue()).events), workpieces, disturbances, report)
 
 
@@ -134,10 +135,9 @@ def _first_wrong(cell: DrawnCell, course: Course, seen: Run) -> str | None:
     return None
 
 
-def disagreements(seed: int) -> Iterator[str | None]:
+def disagreements(cell: DrawnCell, seed: int) -> Iterator[str | None]:
     """What the runs of a drawn cell do and its loops do not, however commands are sent: of each run that is followed to
     its end the first such thing, or an empty text; of each other None."""
-    cell = drawn_cell(seed)
     for faults in (Faults.NONE, Faults.FOR_GOOD) if failing(cell) else (Faults.NONE,):
         seen = run(cell, seed, faults=faults)
         for sending in Sending:
@@ -155,16 +155,24 @@ def runs_in_circles_end_soon(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.seeds
 @pytest.mark.parametrize("chunk", range(2))
 def test_runs_of_drawn_cells_are_runs_of_their_loops(chunk: int) -> None:
-    found = [words for seed in seeds(3, chunk) for words in disagreements(seed)]
+    found = [words for seed in seeds(3, chunk) for words in disagreements(drawn_cell(seed), seed)]
     followed = [words for words in found if words is not None]
     assert not any(followed), "\n\n".join(followed)
     assert len(followed) > len(found) / 2
 
 
 @pytest.mark.seeds
+@pytest.mark.parametrize("seed", seeds(5))
+def test_runs_of_drawn_tables_are_runs_of_their_loops(seed: int) -> None:
+    followed = [words for words in disagreements(drawn_table(seed), seed) if words is not None]
+    assert not any(followed), "\n\n".join(followed)
+
+
+@pytest.mark.seeds
 @pytest.mark.parametrize("seed", seeds(2))
-def test_the_loop_of_a_drawn_cell_is_what_its_plant_file_says(seed: int) -> None:
-    cell = drawn_cell(seed)
+@pytest.mark.parametrize("draw", [drawn_cell, drawn_table])
+def test_the_loop_of_a_drawn_cell_is_what_its_plant_file_says(seed: int, draw: Callable[[int], DrawnCell]) -> None:
+    cell = draw(seed)
     for sending in Sending:
         for faults in Faults:
             loop = close(cell.net, cell.plant, faults, sending)
@@ -173,18 +181,20 @@ def test_the_loop_of_a_drawn_cell_is_what_its_plant_file_says(seed: int) -> None
 
 @pytest.mark.parametrize("seed", TOLD_LATE)
 def test_a_loop_that_tells_nothing_late_lacks_a_run_of_a_drawn_cell(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    cell, before = drawn_cell(seed), [*disagreements(seed)]
+    cell = drawn_cell(seed)
+    before = [*disagreements(cell, seed)]
     monkeypatch.setattr(Telling, "told_late", lambda *_: frozenset())
-    found = {words: whole for whole, words in zip(before, disagreements(seed), strict=True) if words}
+    found = {words: whole for whole, words in zip(before, disagreements(cell, seed), strict=True) if words}
     assert set(found.values()) == {""}, "the loop that tells of it has the whole run"
     assert all(cell.net_text in words and cell.plant_text in words for words in found)
 
 
 def test_drawn_cells_have_much_of_what_can_be_written() -> None:
-    cells = [drawn_cell(seed) for seed in range(40)]
+    cells = [draw(seed) for seed in range(40) for draw in (drawn_cell, drawn_table)]
     nets, plants = "".join(cell.net_text for cell in cells), "".join(cell.plant_text for cell in cells)
-    does = "move grasp put carry clamp process release stop"
+    does = "move grasp put carry index clamp process release stop switch"
     keys = "may_fail when_full occupied holding passes fails acknowledges set_by for_s may_linger may_flicker"
+    keys += " full_at_first"
     assert [word for word in f"{does} {keys}".split() if word not in plants] == []
     assert [word for word in ("until", "within", "if", "unless") if f"{word}:" not in nets] == []
     assert any(len(cell.net.controllers) > 1 for cell in cells)

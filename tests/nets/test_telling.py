@@ -22,7 +22,7 @@ from firable.nets.verdict import Status
 
 CELLS = (
     *("one_robot", "one_robot_mc_late", "one_robot_mc_late_capacity", "one_robot_timed"),
-    *("two_robots_shared", "two_robots_separate", "two_cells"),
+    *("two_robots_shared", "two_robots_separate", "two_cells", "index_table"),
 )
 
 

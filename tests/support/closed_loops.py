@@ -50,6 +50,6 @@ def other_plants(model: PlantModel, seed: int) -> PlantModel:
                 machine["commands"][name] = draw.choice(_OTHERS)
             elif action["does"] == "stop":
                 action["takes_s"] = draw.choice([0.0, 1.0])
-            else:
+            elif action["does"] != "switch":
                 action.update(draw.choice([{"may_fail": "repairable"}, {"may_fail": "for_good"}, {}]))
     return PlantModel.model_validate(data)

@@ -61,7 +61,8 @@ class DrawnCell:
 
 def drawn_cell(seed: int) -> DrawnCell:
     """The cell of a seed."""
-    drawing = _Drawing(random.Random(seed))
+    first, more = random.Random(seed), random.Random(f"more of {seed}")  # a cell stays what it was when it gets more
+    drawing = _Drawing(first)
     for i in range(drawing.draw.randint(1, 2)):
         if drawing.draw.random() < 0.5:
             drawing.robot(i)
@@ -77,7 +78,33 @@ def drawn_cell(seed: int) -> DrawnCell:
     if drawing.draw.random() < 0.35:
         drawing.coordinate()
     drawing.see_completions()
-    return DrawnCell(_text(drawing.net()), _text(drawing.plant()))
+    drawing.draw = more
+    if more.random() < 0.2:
+        drawing.lamp()
+    drawing.draw = first
+    plant = drawing.plant()
+    drawing.draw = more
+    if more.random() < 0.3:
+        plant["full_at_first"] = drawing.full_at_first(plant)
+    return DrawnCell(_text(drawing.net()), _text(plant))
+
+
+def drawn_table(seed: int) -> DrawnCell:
+    """A cell with a table that moves several workpieces at once, and little else: it gets to that often."""
+    draw = random.Random(f"table {seed}")
+    drawing = _Drawing(draw)
+    drawing.table()
+    if draw.random() < 0.4:
+        drawing.belt(0)
+    if draw.random() < 0.2:
+        drawing.tool()
+    for i in range(draw.randint(0, 2)):
+        drawing.watcher(i)
+    if draw.random() < 0.3:
+        drawing.lamp()
+    plant = drawing.plant()
+    plant["full_at_first"] = drawing.full_at_first(plant)
+    return DrawnCell(_text(drawing.net()), _text(plant))
 
 
 def _text(document: Document) -> str:
@@ -183,6 +210,35 @@ class _Drawing:
         first.wanted.append(seen)
         if waits:
             last.unwanted.append(seen)
+
+    def table(self) -> None:
+        """A machine that moves what lies on some stations at once, round in a circle or not, and perhaps back."""
+        stations = self.draw.sample(self.stations, self.draw.randint(2, len(self.stations)))
+        ring = self.draw.random() < 0.6
+        following = {stations[i - 1]: at for i, at in enumerate(stations) if i or ring}
+        commands = {"INDEX": self.command("index", {"next": following})}
+        if self.draw.random() < 0.3:
+            commands["BACK"] = self.command("index", {"next": {to: at for at, to in following.items()}})
+        self.machines["I"] = {"commands": commands}
+        free = self.rest(f"{self.draw.choice(self.controllers)}.free_I")
+        steps = [self.commanding(free, f"{command.lower()}_I", "I", command) for command in commands]
+        begins = self.cycle(free, steps)[0]
+        begins.wanted.append(self.sensor_beside(begins, "full_I", {"occupied": self.draw.choice(stations)}))
+        if self.draw.random() < 0.6:
+            begins.unwanted.append(self.sensor_beside(begins, "taken_I", {"occupied": stations[-1]}))
+
+    def lamp(self) -> None:
+        """A lamp that is lit as long as a sensor shows something."""
+        self.machines["L"] = {"commands": {colour: {"does": "switch"} for colour in ("GREEN", "DARK")}}
+        controller, seen = self.draw.choice(self.controllers), self.draw.choice([*self.sensors])
+        unlit = self.rest(f"{controller}.unlit_L")
+        lit, out = (
+            self.place(f"{controller}.{colour.lower()}_L", {"send": {"machine": "L", "command": colour}})
+            for colour in ("GREEN", "DARK")
+        )
+        lights, darkens, _ = self.cycle(unlit, [lit, out])
+        lights.wanted.append(seen)
+        darkens.unwanted.append(seen)
 
     def route(self, i: int) -> tuple[str, str]:
         source = self.entry if i == 0 or self.draw.random() < 0.5 else self.draw.choice(self.stations)
@@ -376,6 +432,16 @@ class _Drawing:
         if self.draw.random() < 0.3:
             found["departures"] = self.ways_out(found["departures"])
         return found
+
+    def full_at_first(self, plant: Document) -> Document:
+        """Stations where a workpiece lies, machined or not, where some machine does that and it may leave so."""
+        ways_out = plant["departures"] if isinstance(plant["departures"], list) else [plant["departures"]]
+        ends = {one["station"] for one in ways_out if not one.get("raw")}
+        machined = "T" in self.machines
+        kinds = {at: ["raw"] * (at not in ends or not machined) + ["machined"] * machined for at in self.stations}
+        return {
+            at: self.draw.choice(kinds[at]) for at in self.stations if at != self.entry and self.draw.random() < 0.5
+        }
 
     def ways_out(self, first: Document) -> list[Document]:
         """Some workpieces leave elsewhere, or as they came."""

@@ -12,6 +12,7 @@ from firable.nets.machines.plant_file import Move, PlantModel
 from firable.semantics.trace import Trace, parse_trace
 
 CELLS = [
+    "index_table",
     "one_robot",
     "one_robot_mc_late",
     "one_robot_mc_late_capacity",
