@@ -35,7 +35,7 @@ def lane_order(participants: Sequence[frozenset[int]], lanes: int) -> tuple[int,
     wide = [lanes_of for lanes_of in participants if len(lanes_of) > 1]
     orders: Iterable[tuple[int, ...]] = permutations(range(lanes))
     if lanes > _PERMUTED_MAX:
-        orders = (tuple(range(lanes)), *(_grown(wide, lanes, start) for start in range(min(lanes, _GROWN_MAX))))
+        orders = (tuple(range(lanes)), *(grown(wide, lanes, start) for start in range(min(lanes, _GROWN_MAX))))
 
     def passed_over(order: tuple[int, ...]) -> int:
         position = {lane: i for i, lane in enumerate(order)}
@@ -46,31 +46,39 @@ def lane_order(participants: Sequence[frozenset[int]], lanes: int) -> tuple[int,
     return min(orders, key=lambda order: (passed_over(order), order))
 
 
-def _grown(wide: Sequence[frozenset[int]], lanes: int, start: int) -> tuple[int, ...]:
-    """An order from one lane on: each next one closes the most transitions that are open, and opens the fewest."""
+def grown(wide: Iterable[frozenset[int]], lanes: int, start: int) -> tuple[int, ...]:
+    """An order from one lane on: each next one closes the most transitions that are open, and opens the fewest.
+
+    `wide` are the lanes of each transition. By then as good as others is what is open longest, then what is first.
+    """
+    wide = list(wide)
     of_lane: list[list[int]] = [[] for _ in range(lanes)]
     missing = [len(lanes_of) for lanes_of in wide]
     for t, lanes_of in enumerate(wide):
         for lane in lanes_of:
             of_lane[lane].append(t)
-    order, rest, since = [start], set(range(lanes)) - {start}, dict.fromkeys(of_lane[start], 0)
-    for t in of_lane[start]:
-        missing[t] -= 1
+    since: dict[int, int] = {}
 
     def cost(lane: int) -> tuple[int, int, int]:
         opened = sum(t not in since for t in of_lane[lane])
         closed = sum(missing[t] == 1 for t in of_lane[lane])
-        oldest = min((since[t] for t in of_lane[lane] if t in since), default=len(order))
+        oldest = min((since[t] for t in of_lane[lane] if t in since), default=lanes)
         return opened - closed, oldest, lane
 
-    while rest:
-        lane = min(rest, key=cost)
-        rest.remove(lane)
+    costs = {lane: cost(lane) for lane in range(lanes)}
+    order: list[int] = []
+    lane = start
+    while True:
+        del costs[lane]
         for t in of_lane[lane]:
             since.setdefault(t, len(order))
             missing[t] -= 1
         order.append(lane)
-    return tuple(order)
+        if not costs:
+            return tuple(order)
+        for other in {other for t in of_lane[lane] for other in wide[t]} & costs.keys():
+            costs[other] = cost(other)
+        lane = min(costs, key=costs.__getitem__)
 
 
 def rows_of(net: Net, spans: Sequence[Span], kept: Mapping[str, float] = MappingProxyType({})) -> tuple[int, ...]:
