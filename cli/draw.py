@@ -12,11 +12,12 @@ from firable.cli.files import READ, WRITTEN
 from firable.cli.options import load_net, net_argument, write_text
 
 _OF: Final[Mapping[str, tuple[str, ...]]] = {
-    "marking": ("net",),
-    "trace": ("net", "strip"),
+    "marking": ("net", "overview"),
+    "trace": ("net", "overview", "strip"),
     "collapse": ("net",),
+    "controller": ("net",),
     "keep_layout": ("net",),
-    "width": ("net", "coordinator", "strip"),
+    "width": ("net", "overview", "coordinator", "strip"),
     "discipline": ("graph",),
     "max_markings": ("graph",),
     "layout": ("net", "graph"),
@@ -24,7 +25,7 @@ _OF: Final[Mapping[str, tuple[str, ...]]] = {
 """Of which pictures each option is."""
 
 
-@click.command(short_help="Draw a net, its coordinator, its reachability graph or a run of it, as SVG.")
+@click.command(short_help="Draw a net, an overview, its coordinator, its reachability graph or a run, as SVG.")
 @net_argument
 @click.option(
     "-o",
@@ -36,10 +37,11 @@ _OF: Final[Mapping[str, tuple[str, ...]]] = {
 )
 @click.option(
     "--what",
-    type=OneOf(["net", "coordinator", "graph", "strip"]),
+    type=OneOf(["net", "overview", "coordinator", "graph", "strip"]),
     default="net",
     show_default=True,
-    help="The net; who decides what over whom; its reachability graph; a run of it, a small picture for each step.",
+    help="The net; its controllers and what they share; who decides what over whom; its reachability graph; a run of "
+    "it, a small picture for each step.",
 )
 @click.option(
     "--marking", metavar="PLACES", help="Show the tokens on these places, separated by commas, instead of M0."
@@ -57,6 +59,12 @@ _OF: Final[Mapping[str, tuple[str, ...]]] = {
     help="Draw a task as one place: the task that a place is in, those of a controller, or `all`; repeatable.",
 )
 @click.option(
+    "--controller",
+    metavar="NAME",
+    multiple=True,
+    help="Draw this controller alone, with its parts of the transitions that it shares; repeatable.",
+)
+@click.option(
     "--keep-layout", is_flag=True, help="Keep how the picture is arranged in a file beside NET, for the next time."
 )
 @click.option(
@@ -64,7 +72,8 @@ _OF: Final[Mapping[str, tuple[str, ...]]] = {
     type=click.IntRange(400, 100_000),
     default=None,
     metavar="PIXELS",
-    help="Wrap what is wider than so many pixels.  [default: 2600 of a net, 1900 of a coordinator, 1500 of a strip]",
+    help="Wrap what is wider than so many pixels.  [default: 2600 of a net, 1300 of an overview, 1900 of a "
+    "coordinator, 1500 of a strip]",
 )
 @click.option(
     "--discipline",
@@ -92,6 +101,7 @@ def draw(
     marking: str | None,
     trace: str | None,
     collapse: tuple[str, ...],
+    controller: tuple[str, ...],
     keep_layout: bool,
     width: int | None,
     discipline: str | None,
@@ -103,11 +113,14 @@ def draw(
     Circles are places and bars transitions; permissive gates are dashed with a black dot at the transition, inhibitive
     ones with a hollow circle; external gates are stubs; a small arrow leads from a place to its command. Lanes that are
     wider than the sheet are wrapped, and --collapse draws what a controller does for one task as one place, a double
-    circle. A layout file beside NET (cell.layout.yaml of cell.firable.yaml) says how the picture is arranged.
+    circle; of a large net --controller draws some controllers alone. A layout file beside NET (cell.layout.yaml of
+    cell.firable.yaml) says how the picture is arranged.
 
-    --what coordinator draws the split over the controllers: for each global transition who decides it, the part of each
-    controller, what it waits for, and what competes. --what strip draws the run of a --trace, as `firable check
-    --trace-dir` and `firable run` write them: a small picture for each step, of the places that matter.
+    --what overview draws each controller as a line, with where its tokens are, and each transition that several share
+    as a bar across their lines. --what coordinator draws the split over the controllers: for each global transition who
+    decides it, the part of each controller, what it waits for, and what competes. --what strip draws the run of a
+    --trace, as `firable check --trace-dir` and `firable run` write them: a small picture for each step, of the places
+    that matter.
 
     --what graph draws the reachability graph: its markings by what is different from M0, the firings between them,
     deadlocks and doomed markings marked. Of a large net the markings nearest to M0 are drawn, and the picture says how
@@ -119,6 +132,7 @@ def draw(
         "marking": marking,
         "trace": trace,
         "collapse": collapse or None,
+        "controller": controller or None,
         "keep_layout": keep_layout or None,
         "width": width,
         "discipline": discipline,
@@ -140,6 +154,8 @@ def draw(
             if layout == "lanes":
                 raise click.UsageError("--layout lanes is of --what net: markings have no lanes")
             picture = pictures.graph_picture(loaded, discipline or "interleaving", limit, layout or "layered")
+        case "overview":
+            picture = pictures.overview_picture(loaded, pictures.shown_on(loaded, marking, trace), width)
         case "coordinator":
             picture = pictures.coordinator_picture(loaded, width)
         case "strip":
@@ -147,12 +163,15 @@ def draw(
                 raise click.UsageError("--what strip draws the run of a trace: add --trace FILE")
             picture = pictures.strip_picture(loaded, trace, width)
         case _:
-            if layout not in {None, "lanes"} and (collapse or keep_layout or width):
+            if layout not in {None, "lanes"} and (collapse or controller or keep_layout or width):
                 raise click.UsageError(
-                    f"--collapse, --keep-layout and --width are of lanes: leave out --layout {layout}"
+                    f"--collapse, --controller, --keep-layout and --width are of lanes: leave out --layout {layout}"
                 )
+            if controller and keep_layout:
+                raise click.UsageError("--keep-layout keeps how the whole net is arranged: leave out --controller")
             kept = pictures.kept_layout(loaded, net)
-            picture = pictures.net_picture(loaded, marking, trace, collapse, kept, width, layout)
+            shown = pictures.shown_on(loaded, marking, trace)
+            picture = pictures.net_picture(loaded, shown, collapse, controller, kept, width, layout)
             if keep_layout:
                 pictures.keep(loaded, net, kept)
     write_text(output, picture)

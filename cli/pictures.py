@@ -6,7 +6,8 @@ they are found, by the rooms that know. Rejected: pictures that ask by themselve
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -28,14 +29,51 @@ EXPLORED_MAX: Final = 200_000
 """How many markings are looked for in order to say how many there are, and which are doomed."""
 
 
-def drawable(net: Net) -> None:
-    """Refuse a net that is too large for a picture."""
-    from firable.nets.drawing import NODES_MAX
+def drawable(net: Net, controllers: Collection[str] = ()) -> None:
+    """Refuse a net, or some controllers of it, that are too large for a picture of their places."""
+    from firable.nets.drawing import NODES_MAX, has_overview
+    from firable.nets.drawing.part import everybody, part_of
 
-    if (n_nodes := len(net.places) + len(net.transitions)) > NODES_MAX:
-        raise click.UsageError(
-            f"{n_nodes:,} places and transitions make no picture that anybody can read; at most {NODES_MAX:,} are drawn"
-        )
+    refuse_unknown_controllers(net, controllers)
+    part = part_of(net, controllers, everybody(net)) if controllers else net
+    if (n_nodes := len(part.places) + len(part.transitions)) > NODES_MAX:
+        overview = "; --what overview draws what they share" if has_overview(net) else ""
+        raise click.UsageError(f"{_too_large(n_nodes, net)}{overview}")
+
+
+def viewable(net: Net, controllers: Collection[str]) -> None:
+    """Refuse a net of which nothing can be shown: it is too large for a picture, and so for an overview."""
+    from firable.nets.drawing import NODES_MAX, has_overview
+
+    if controllers:
+        drawable(net, controllers)
+    elif (n_nodes := len(net.places) + len(net.transitions)) > NODES_MAX and not has_overview(net):
+        raise click.UsageError(_too_large(n_nodes, net))
+
+
+def _too_large(n_nodes: int, net: Net) -> str:
+    """Why no picture is drawn of so many places and transitions, and what to do about it."""
+    from firable.nets.drawing import NODES_MAX
+    from firable.nets.drawing.part import owners_of
+
+    hint = "--controller NAME draws some of its controllers"
+    if len(owners_of(net)) < 2:
+        hint = "`firable split --suggest` proposes controllers for it, which are drawn one by one"
+    why = "places and transitions make no picture that anybody can read"
+    return f"{n_nodes:,} {why}; at most {NODES_MAX:,} are drawn: {hint}"
+
+
+def refuse_unknown_controllers(net: Net, controllers: Collection[str]) -> None:
+    """Refuse controllers that the net has not, and those that own nothing that could be drawn."""
+    from firable.nets.drawing.part import owners_of
+
+    names = [controller.name for controller in net.controllers]
+    if unknown := [name for name in controllers if name not in names]:
+        from firable.nets.diagnostics import with_meant
+
+        raise click.UsageError(with_meant(f"the net has no controller '{unknown[0]}'", unknown[0], names))
+    if bare := [name for name in controllers if name not in owners_of(net)]:
+        raise click.UsageError(f"--controller {bare[0]}: it owns no place and no signal, so there is nothing to draw")
 
 
 def kept_layout(net: Net, argument: str) -> Arrangement:
@@ -68,42 +106,83 @@ def keep(net: Net, argument: str, given: Arrangement) -> None:
     write_whole(str(layout_path(argument)), format_layout(arranged(net, given)))
 
 
-def net_picture(
-    net: Net,
-    marking: str | None,
-    trace: str | None,
-    collapse: tuple[str, ...],
-    given: Arrangement,
-    width: int | None,
-    layout: str | None,
-) -> str:
-    """The net, with the tokens that a marking or the end of a trace names."""
-    from firable.nets.drawing import draw_free, draw_net
+@dataclass(frozen=True)
+class Shown:
+    """What is to be seen on a net: its tokens, what has fired, and the line below the title; by default M0."""
 
-    drawable(net)
-    refuse_unknown(net, collapse)
-    draw: partial[str] = partial(draw_net, net, folded=collapse, given=given, width_max=width or WIDTH_MAX)
-    if layout is not None and layout != "lanes":
-        draw = partial(draw_free, net, layout=_layouter(layout))
+    marking: Marking | None = None
+    firings: Sequence[Sequence[str]] = ()
+    caption: str = ""
+
+
+def shown_on(net: Net, marking: str | None, trace: str | None) -> Shown:
+    """The tokens that a marking or the end of a trace names; raises `InputError` F5004 where it is none of the net."""
     if trace is not None:
         from firable.semantics.replaying import replay as play
         from firable.semantics.trace import read_trace
 
         read = read_trace(trace)
         done = play(net, read)
-        firings = _fired(read)
-        caption = f"after {counted(done.firings, 'firing')} of {Path(trace).name}"
-        return draw(marking=done.marking, firings=firings, caption=caption)
-    shown = None
-    if marking is not None:
-        names = [name.strip() for name in marking.split(",") if name.strip()]
-        if unknown := [name for name in names if name not in net.place_index]:
-            from firable.nets.diagnostics import with_meant
+        return Shown(done.marking, _fired(read), f"after {counted(done.firings, 'firing')} of {Path(trace).name}")
+    if marking is None:
+        return Shown()
+    names = [name.strip() for name in marking.split(",") if name.strip()]
+    if unknown := [name for name in names if name not in net.place_index]:
+        from firable.nets.diagnostics import with_meant
 
-            message = f"the net has no place '{unknown[0]}'"
-            raise click.UsageError(with_meant(message, unknown[0], list(net.place_index)))
-        shown = net.marking(names)
-    return draw(marking=shown)
+        message = f"the net has no place '{unknown[0]}'"
+        raise click.UsageError(with_meant(message, unknown[0], list(net.place_index)))
+    return Shown(net.marking(names))
+
+
+def net_picture(
+    net: Net,
+    shown: Shown,
+    collapse: tuple[str, ...],
+    controllers: tuple[str, ...],
+    given: Arrangement,
+    width: int | None,
+    layout: str | None,
+) -> str:
+    """The net, or some controllers of it."""
+    from firable.nets.drawing import draw_free, draw_net
+
+    drawable(net, controllers)
+    refuse_unknown(net, collapse)
+    if layout is not None and layout != "lanes":
+        placed = _layouter(layout)
+        return draw_free(net, marking=shown.marking, firings=shown.firings, caption=shown.caption, layout=placed)
+    return draw_net(
+        net,
+        marking=shown.marking,
+        firings=shown.firings,
+        caption=shown.caption,
+        folded=collapse,
+        owners=controllers or None,
+        given=given,
+        width_max=width or WIDTH_MAX,
+    )
+
+
+def overview_picture(net: Net, shown: Shown, width: int | None) -> str:
+    """The controllers of a net, and the transitions that they share."""
+    from firable.nets.drawing import draw_overview, has_overview
+    from firable.nets.drawing.overview import LINES_MAX
+    from firable.nets.drawing.overview import WIDTH_MAX as ENOUGH
+    from firable.nets.drawing.part import owners_of
+
+    if not has_overview(net):
+        if len(owners_of(net)) < 2:
+            raise click.UsageError("an overview shows what controllers share, and this net has no two of them")
+        most = f"at most {LINES_MAX:,} controllers and transitions that they share are drawn"
+        raise click.UsageError(f"the net is too large for an overview: {most}")
+    return draw_overview(
+        net,
+        marking=shown.marking,
+        firings=shown.firings,
+        caption=shown.caption,
+        width_max=width or ENOUGH,
+    )
 
 
 def refuse_unknown(net: Net, collapse: tuple[str, ...]) -> None:

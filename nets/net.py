@@ -419,7 +419,9 @@ class Net:
         return next((controller for controller in self.controllers if controller.coordinator), None)
 
     def _repr_svg_(self) -> str | None:
-        """The picture of the net in a notebook; nothing of a net too large for one, which shows its text instead."""
-        from firable.nets.drawing import NODES_MAX, draw_net
+        """The picture of the net in a notebook, of a large one its overview; else nothing, and its text is shown."""
+        from firable.nets.drawing import NODES_MAX, draw_net, draw_overview, has_overview
 
-        return draw_net(self) if len(self.places) + len(self.transitions) <= NODES_MAX else None
+        if len(self.places) + len(self.transitions) <= NODES_MAX:
+            return draw_net(self)
+        return draw_overview(self) if has_overview(self) else None

@@ -235,13 +235,17 @@ def _drawn(report: Report, verdict: Verdict, witness: Witness) -> Markup:
 
 
 def _picture(report: Report) -> Markup | None:
-    from firable.nets.drawing import draw_net
+    from firable.nets.drawing import draw_net, draw_overview, has_overview
 
     net = report.net
-    if len(net.transitions) > _DRAWN_TRANSITIONS_MAX:
+    is_large = len(net.transitions) > _DRAWN_TRANSITIONS_MAX
+    if is_large and not has_overview(net):
         return tag("p", f"{counted(len(net.transitions), 'transition')} are too many for a picture that can be read.")
     label = f"the net of {net.name or 'the cell'}, a lane for each controller"
-    return tag("div", raw(draw_net(net)), cls="picture", tabindex="0", role="region", aria_label=label)
+    if is_large:
+        label = f"the controllers of {net.name or 'the cell'}, and the transitions that they share"
+    drawn = raw(draw_overview(net) if is_large else draw_net(net))
+    return tag("div", drawn, cls="picture", tabindex="0", role="region", aria_label=label)
 
 
 def _coordinator(report: Report) -> Markup | None:

@@ -20,7 +20,6 @@ import asyncio
 import json
 from collections import deque
 from collections.abc import Collection, Iterable
-from dataclasses import replace
 from typing import Any, Final
 
 from aiohttp import web
@@ -37,9 +36,9 @@ from firable.executor import Host
 from firable.executor.operating.latch import may_stay
 from firable.executor.operating.restart import asked_of_the_operator
 from firable.executor.protocol.token_player import TokenPlayer, Word
+from firable.nets.drawing.part import everybody, part_of
 from firable.nets.machines.fitting import misfits
 from firable.nets.machines.plant_file import PlantModel
-from firable.nets.net import Net
 from firable.semantics.joining import APPLIED, STANDS, VOTED
 from firable.semantics.trace import CommandSent, Event, Fired, Noted, SignalChanged
 
@@ -58,7 +57,7 @@ class LivePage:
         self.host = host
         self.opening = opening
         self.owners = None if host.is_whole else frozenset(host.controllers)
-        self.net = host.net if self.owners is None else own_part(host.net, self.owners)
+        self.net = host.net if self.owners is None else part_of(host.net, self.owners, everybody(host.net))
         self.player = TokenPlayer.of(self.net)
         self.lanes = Lanes(self.net)
         self.followers: set[_Follower] = set()
@@ -271,24 +270,3 @@ class _Follower:
                 await self.is_new.wait()
         except TimeoutError:
             return
-
-
-def own_part(net: Net, owners: Collection[str]) -> Net:
-    """What of a net is of some controllers: their places and signals, and their parts of its transitions."""
-    places = tuple(place for place in net.places if place.owner in owners)
-    signals = tuple(signal for signal in net.signals if signal.owner in owners)
-    here, read = {place.name for place in places}, {signal.name for signal in signals}
-    parts = []
-    for transition in net.transitions:
-        part = replace(
-            transition,
-            inputs=tuple(name for name in transition.inputs if name in here),
-            outputs=tuple(name for name in transition.outputs if name in here),
-            permissive=tuple(name for name in transition.permissive if name in here),
-            inhibitive=tuple(name for name in transition.inhibitive if name in here),
-            external=tuple(gate for gate in transition.external if gate.signal in read),
-        )
-        if part.inputs or part.outputs or part.permissive or part.inhibitive or part.external:
-            parts.append(part)
-    controllers = tuple(replace(c, under=None) for c in net.controllers if c.name in owners)
-    return Net(net.name, places, tuple(parts), signals, controllers, description=net.description)

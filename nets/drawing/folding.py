@@ -12,9 +12,10 @@ net. Only refined nets have one, and the pieces are the same.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Final
 
+from firable.nets.drawing.part import everybody
 from firable.nets.net import Marking, Net, Place, Signal, Transition
 
 ALL: Final = "all"
@@ -27,22 +28,28 @@ class Folded:
 
     net: Net
     members: Mapping[str, tuple[str, ...]]
-    participants: Mapping[str, frozenset[str | None]] = field(default_factory=dict)
+    participants: Mapping[str, frozenset[str | None]]
     """Who takes part in each transition that is left: a part inside a folded task is none that an arc would show."""
 
-    def is_global(self, net: Net) -> list[bool]:
+    @property
+    def is_global(self) -> list[bool]:
         """Of each transition that is left, whether more than one controller takes part in it."""
-        return [len(taking_part(net, net.transition(t.name))) > 1 for t in self.net.transitions]
+        return [len(self.participants[t.name]) > 1 for t in self.net.transitions]
 
     def marking(self, net: Net, marking: Marking) -> Marking:
-        """The marking of the folded net: a macro place is marked where a place inside it is."""
-        held = set(net.names(marking))
+        """The marking of the folded net: a macro place is marked where a place inside it is.
+
+        `net` may be one of which what was folded is a part.
+        """
         inside = {member: name for name, members in self.members.items() for member in members}
-        return self.net.marking({inside.get(name, name) for name in held})
+        held = {inside.get(name, name) for name in net.names(marking)}
+        return self.net.marking(held & self.net.place_index.keys())
 
 
-def fold(net: Net, names: Collection[str]) -> Folded:
+def fold(net: Net, names: Collection[str], participants: Mapping[str, frozenset[str | None]] | None = None) -> Folded:
     """Fold the tasks that these names name: a place names the one it is in, a controller all of its tasks.
+
+    `participants` are those of each transition, where the net is a part and its arcs do not say so.
 
     `all` names every task. A place that is idle, or alone in its task, folds nothing. Raises `KeyError` for a name that
     is neither place nor controller.
@@ -62,7 +69,8 @@ def fold(net: Net, names: Collection[str]) -> Folded:
         if ALL in names or net.place(task[0]).owner in names or any(place in names for place in task)
     ]
     members = {task[0]: task for task in chosen if len(task) > 1}
-    return _folded(net, members) if members else Folded(net, {})
+    participants = everybody(net) if participants is None else participants
+    return _folded(net, members, participants) if members else Folded(net, {}, participants)
 
 
 def tasks(net: Net) -> list[tuple[str, ...]]:
@@ -90,19 +98,14 @@ def tasks(net: Net) -> list[tuple[str, ...]]:
     return sorted((tuple(task) for task in found.values()), key=lambda task: net.place_index[task[0]])
 
 
-def taking_part(net: Net, t: Transition) -> frozenset[str | None]:
-    """The owners of what a transition takes, puts and reads; None stands for what nobody owns."""
-    places = (*t.inputs, *t.outputs, *t.permissive, *t.inhibitive)
-    owners = {net.place(name).owner for name in places} | {net.signal(gate.signal).owner for gate in t.external}
-    return frozenset(owners)
-
-
-def _folded(net: Net, members: Mapping[str, tuple[str, ...]]) -> Folded:
+def _folded(
+    net: Net, members: Mapping[str, tuple[str, ...]], participants: Mapping[str, frozenset[str | None]]
+) -> Folded:
     inside = {member: name for name, some in members.items() for member in some}
     seen = (place for place in net.places if inside.get(place.name, place.name) == place.name)
     places = tuple(_macro(net, place, members) for place in seen)
-    transitions = tuple(transition for t in net.transitions if (transition := _outside(net, t, inside)) is not None)
-    participants = {t.name: taking_part(net, net.transition(t.name)) for t in transitions}
+    outside = (_outside(t, inside, is_local=len(participants[t.name]) == 1) for t in net.transitions)
+    transitions = tuple(t for t in outside if t is not None)
     # What is folded sends no command, so nothing completes one: every signal is one that comes from outside.
     signals = tuple(Signal(signal.name, signal.owner) for signal in net.signals)
     plain = tuple(replace(place, completion=None, within=None) for place in places)
@@ -116,7 +119,7 @@ def _macro(net: Net, place: Place, members: Mapping[str, tuple[str, ...]]) -> Pl
     return Place(place.name, place.owner, marked=any(net.place(name).marked for name in members[place.name]))
 
 
-def _outside(net: Net, t: Transition, inside: Mapping[str, str]) -> Transition | None:
+def _outside(t: Transition, inside: Mapping[str, str], *, is_local: bool) -> Transition | None:
     """A transition between what is folded; nothing where a folded task takes it in whole."""
 
     def moved(names: Iterable[str]) -> tuple[str, ...]:
@@ -124,7 +127,7 @@ def _outside(net: Net, t: Transition, inside: Mapping[str, str]) -> Transition |
 
     inputs, outputs = moved(t.inputs), moved(t.outputs)
     within = {name for name in inputs if name in outputs and name in set(inside.values())}
-    if within and len(taking_part(net, t)) == 1 and within.issuperset((*inputs, *outputs)):
+    if within and is_local and within.issuperset((*inputs, *outputs)):
         return None
     kept = tuple(name for name in inputs if name not in within), tuple(name for name in outputs if name not in within)
     permissive = tuple(name for name in moved(t.permissive) if name not in {*inputs, *outputs})

@@ -36,9 +36,9 @@ def place_words(place: Place, inside: Sequence[str] = ()) -> Words:
 def transition_words(transition: Transition, elsewhere: Sequence[str], *, in_margin: bool) -> Words:
     """What stands beside a transition: its name, its description, and who takes part in it in another panel.
 
-    In the margin there is room for two lines of what is said; in a lane for one, because a place follows below.
+    In the margin there is room for two lines of each; in a lane for one, because a place follows below.
     """
     width, lines_max = (_NOTE_CHARACTERS, 2) if in_margin else (_WIDE_CHARACTERS, 1)
-    also = wrapped(f"also {', '.join(elsewhere)}", width, 1) if elsewhere else []
+    also = wrapped(f"also {', '.join(elsewhere)}", width, lines_max) if elsewhere else []
     notes = wrapped(transition.description, width, lines_max)
     return (transition.name, NAME), *((line, NOTE) for line in (*notes, *also))

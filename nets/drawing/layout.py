@@ -21,8 +21,8 @@ from types import MappingProxyType
 from typing import Final
 
 from firable.nets.drawing.arrangement import Arrangement, Owner
-from firable.nets.drawing.folding import taking_part
 from firable.nets.drawing.labels import local_name, place_words, transition_words
+from firable.nets.drawing.part import taking_part
 from firable.nets.drawing.rows import lane_order, rows_of
 from firable.nets.drawing.shapes import (
     BAR_HALF_WIDTH,

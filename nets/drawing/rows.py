@@ -12,7 +12,7 @@ wherever that is, so a small change of the net turns the picture around.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import permutations
 from types import MappingProxyType
 from typing import Final
@@ -46,10 +46,14 @@ def lane_order(participants: Sequence[frozenset[int]], lanes: int) -> tuple[int,
     return min(orders, key=lambda order: (passed_over(order), order))
 
 
-def grown(wide: Iterable[frozenset[int]], lanes: int, start: int) -> tuple[int, ...]:
+def grown(
+    wide: Iterable[Collection[int]], lanes: int, start: int, before: Sequence[Collection[int]] = ()
+) -> tuple[int, ...]:
     """An order from one lane on: each next one closes the most transitions that are open, and opens the fewest.
 
-    `wide` are the lanes of each transition. By then as good as others is what is open longest, then what is first.
+    `wide` are the lanes of each transition. Of those that are as good the one with what is open longest is next, then
+    the first. `before` are for each lane those that stand before it in any case; `start` has none, and there is no
+    circle.
     """
     wide = list(wide)
     of_lane: list[list[int]] = [[] for _ in range(lanes)]
@@ -66,6 +70,11 @@ def grown(wide: Iterable[frozenset[int]], lanes: int, start: int) -> tuple[int, 
         return opened - closed, oldest, lane
 
     costs = {lane: cost(lane) for lane in range(lanes)}
+    left = [len(some) for some in before] or [0] * lanes
+    behind: list[list[int]] = [[] for _ in range(lanes)]
+    for lane, some in enumerate(before):
+        for other in some:
+            behind[other].append(lane)
     order: list[int] = []
     lane = start
     while True:
@@ -76,9 +85,11 @@ def grown(wide: Iterable[frozenset[int]], lanes: int, start: int) -> tuple[int, 
         order.append(lane)
         if not costs:
             return tuple(order)
+        for other in behind[lane]:
+            left[other] -= 1
         for other in {other for t in of_lane[lane] for other in wide[t]} & costs.keys():
             costs[other] = cost(other)
-        lane = min(costs, key=costs.__getitem__)
+        lane = min((lane for lane in costs if not left[lane]), key=costs.__getitem__)
 
 
 def rows_of(net: Net, spans: Sequence[Span], kept: Mapping[str, float] = MappingProxyType({})) -> tuple[int, ...]:
@@ -113,6 +124,20 @@ def rows_of(net: Net, spans: Sequence[Span], kept: Mapping[str, float] = Mapping
 def depths(net: Net) -> list[int]:
     """How many transitions lead to each one at least, itself among them, without going around a cycle."""
     return _depths(_predecessors(net))
+
+
+def followed(net: Net, some: Sequence[int]) -> list[set[int]]:
+    """For each of some transitions those of them that come before it, without going around a cycle.
+
+    What lies in between may be any transitions that are none of them.
+    """
+    before = _predecessors(net)
+    at = {t: i for i, t in enumerate(some)}
+    found: list[set[int]] = [set() for _ in before]
+    for t in _topological(before):
+        for u in before[t]:
+            found[t] |= {at[u]} if u in at else found[u]
+    return [found[t] for t in some]
 
 
 def _depths(before: Sequence[Sequence[int]]) -> list[int]:

@@ -15,11 +15,13 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from firable.nets.drawing.arrangement import Arrangement
+from firable.nets.drawing.arrangement import Arrangement, Owner
 from firable.nets.drawing.colours import colours
 from firable.nets.drawing.folding import Folded, fold
 from firable.nets.drawing.layout import FREE, arranged
 from firable.nets.drawing.legend import gate_end, legend, legend_items, legend_rows
+from firable.nets.drawing.part import everybody, part_of
+from firable.nets.drawing.rows import depths
 from firable.nets.drawing.shapes import (
     BAR_HALF_HEIGHT,
     BAR_HALF_WIDTH,
@@ -49,6 +51,7 @@ def draw_net(
     firings: Sequence[Iterable[str]] = (),
     caption: str = "",
     folded: Collection[str] = (),
+    owners: Collection[Owner] | None = None,
     given: Arrangement = FREE,
     width_max: float | None = None,
 ) -> str:
@@ -56,7 +59,8 @@ def draw_net(
 
     `marking` is shown instead of M0; `firings` marks each transition with the numbers, from 1, of the steps in which it
     fires; `caption` is the line under the title, by default the description of the net. `folded` names the tasks that
-    are drawn as one place, as `fold` does, with its `KeyError`. `given` settles lanes, rows and tracks. Lanes that are
+    are drawn as one place, as `fold` does, with its `KeyError`. Of some `owners` alone the places are drawn, and the
+    transitions that they take part in, which say who else does. `given` settles lanes, rows and tracks. Lanes that are
     wider than `width_max`, in pixels, are wrapped.
 
     >>> draw_net(Net("empty")).startswith('<svg xmlns="http://www.w3.org/2000/svg"')
@@ -66,14 +70,21 @@ def draw_net(
     for k, fired in enumerate(firings, start=1):
         for name in fired:
             steps.setdefault(name, []).append(k)
-    whole = fold(net, folded)
+    participants = everybody(net)
+    shown = net
+    if owners is not None:  # what is left out still says what comes first
+        shown = part_of(net, owners, participants)
+        deep = {t.name: float(depth) for t, depth in zip(net.transitions, depths(net), strict=True)}
+        given = replace(given, rows=given.rows or deep)
+    whole = fold(shown, folded, participants)
     marked = whole.marking(net, net.initial_marking if marking is None else marking)
     if whole.members:  # what is folded away still says what comes first
-        given = replace(arranged(net, given), tracks=given.tracks)
+        settled = arranged(shown, replace(given, participants=participants))
+        given = replace(settled, tracks=given.tracks)
     panels = wrapped_panels(whole, given, width_max)
     caption = caption or net.description
     items = list(
-        legend_items(whole.net, whole.is_global(net), macros=bool(whole.members), fired=bool(steps)),
+        legend_items(whole.net, whole.is_global, macros=bool(whole.members), fired=bool(steps)),
     )
     width = max([least_width(net.name, caption), 420.0, *(panel.where.width for panel in panels)])
     rows = legend_rows(items, width)

@@ -8,17 +8,17 @@ better, and a place whose arcs are cut would be looked for on two of them.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from firable.nets.drawing.arrangement import Arrangement, Owner
+from firable.nets.drawing.arrangement import Arrangement
 from firable.nets.drawing.folding import Folded
 from firable.nets.drawing.layout import arranged, layout
 from firable.nets.drawing.panels import panels
+from firable.nets.drawing.part import part_of
 from firable.nets.drawing.shapes import Layout
 from firable.nets.drawing.sheet import MARGIN
-from firable.nets.net import Net, Transition
+from firable.nets.net import Net
 
 _LANE_GAP: Final = 14.0
 _PANEL_GAP: Final = 20.0
@@ -47,6 +47,8 @@ def wrapped_panels(whole: Folded, given: Arrangement, width_max: float | None) -
         return [only]
     settled = arranged(whole.net, given)
     owners = [lane.owner for lane in where.lanes]
+    # A transition in which nobody takes part stands in the first panel.
+    taking = {name: some or frozenset(owners[:1]) for name, some in settled.participants.items()}
     users = [
         {owners.index(owner) for owner in taking if owner in owners}
         for taking in (settled.participants[t.name] for t in whole.net.transitions)
@@ -57,39 +59,10 @@ def wrapped_panels(whole: Folded, given: Arrangement, width_max: float | None) -
     top, seen = 0.0, set[str]()
     for some in cut:
         here = [owners[i] for i in some]
-        net = _restricted(whole.net, here, settled.participants, first=not found)
+        net = part_of(whole.net, here, taking)
         laid = layout(net, replace(settled, lanes=tuple(here), tracks=given.tracks), whole.members)
         names = {t.name for t in net.transitions}
         found.append(Panel(net, laid, top, some.start, frozenset(names & seen)))
         seen |= names
         top += laid.bottom - laid.top + _PANEL_GAP
     return found
-
-
-def _restricted(
-    net: Net, owners: Sequence[Owner], participants: Mapping[str, Collection[Owner]], *, first: bool
-) -> Net:
-    """What of a net belongs to these owners, with the transitions in which they take part.
-
-    A transition in which nobody does stands in the first panel.
-    """
-    here = set(owners)
-    places = tuple(place for place in net.places if place.owner in here)
-    signals = tuple(signal for signal in net.signals if signal.owner in here)
-    names = {place.name for place in places} | {signal.name for signal in signals}
-
-    def part(t: Transition) -> Transition:
-        def own(some: Sequence[str]) -> tuple[str, ...]:
-            return tuple(name for name in some if name in names)
-
-        external = tuple(gate for gate in t.external if gate.signal in names)
-        arcs = own(t.inputs), own(t.outputs), own(t.permissive), own(t.inhibitive)
-        return replace(
-            t, inputs=arcs[0], outputs=arcs[1], permissive=arcs[2], inhibitive=arcs[3], external=external, number=None
-        )
-
-    transitions = tuple(
-        part(t) for t in net.transitions if here.intersection(participants[t.name] or owners[: int(first)])
-    )
-    controllers = tuple(replace(c, under=None) for c in net.controllers if c.name in here)
-    return Net(net.name, places, transitions, signals, controllers)

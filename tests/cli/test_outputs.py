@@ -28,7 +28,7 @@ from firable.nets.catalogue import catalogue_path
 WORDS = {
     "check": {"--query"},
     "ci init": {"--install"},
-    "draw": {"--marking", "--collapse"},
+    "draw": {"--marking", "--collapse", "--controller"},
     "explain": {"code"},
     "io": {"--force", "--send"},
     "operate": {"address", "what"},

@@ -19,6 +19,7 @@ from firable.cli.page.sections import SECTIONS
 from firable.cli.report import Report
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.net import Controller, Net, Place, Transition
+from firable.nets.printing import format_net
 from firable.nets.verdict import Status, Verdict, Weight, Witness
 
 VOID = {"br", "meta", "rect", "circle", "path", "line"}
@@ -304,7 +305,18 @@ def test_a_net_of_many_controllers_has_a_page_that_a_browser_can_hold(tmp_path: 
     assert len(page) < 2_000_000
     words = Reading(page).words
     assert "transition parts global because of" in words, "no column for each controller"
-    assert "are too many for a picture that can be read" in words
+    assert "Overview: " not in words, "the net has a description"
+    assert 'id="controller:' in page
+    assert "are too many for a picture that can be read" not in words
+
+
+def test_a_large_net_without_controllers_has_no_picture_on_its_page(tmp_path: Path) -> None:
+    places = tuple(Place(f"p{i}", marked=i == 0) for i in range(81))
+    around = tuple(Transition(f"t{i}", (f"p{i}",), (f"p{(i + 1) % 81}",)) for i in range(81))
+    path = tmp_path / "ring.firable.yaml"
+    path.write_text(format_net(Net("ring", places, around)), "utf-8")
+    words = page_written(tmp_path, "check", str(path)).words
+    assert "81 transitions are too many for a picture that can be read" in words
 
 
 def test_the_page_of_a_split_tells_first_who_decides_what(tmp_path: Path) -> None:

@@ -19,11 +19,11 @@ from support.waiting import PATIENCE_SECONDS
 
 from firable.cli.main import main
 from firable.cli.view.lanes import Lanes
-from firable.cli.view.live import own_part
 from firable.cli.view.votes import awaited
 from firable.executor import Host
 from firable.executor.drivers.far_side.ports import free_port
 from firable.nets.catalogue import catalogue_net
+from firable.nets.drawing.part import everybody, part_of
 from firable.semantics.trace import CommandSent, Fired, SignalChanged, read_trace
 
 expect.set_options(timeout=PATIENCE_MS)
@@ -328,7 +328,8 @@ def test_a_part_that_is_ready_waits_for_those_of_others_as_far_as_they_are_known
 
 
 def test_what_is_of_one_controller_is_its_subnet() -> None:
-    net = own_part(catalogue_net("one_robot"), {"robot"})
+    net = catalogue_net("one_robot")
+    net = part_of(net, {"robot"}, everybody(net))
     assert {place.owner for place in net.places} == {"robot"}
     assert net.transition("G3").inputs == ("robot.grasp_cv1",)
     assert "G1" not in net.transition_index

@@ -10,7 +10,8 @@ from support.whole_nets import whole_nets
 
 from firable.nets.catalogue import catalogue_net
 from firable.nets.drawing import draw_net
-from firable.nets.drawing.folding import fold, taking_part, tasks
+from firable.nets.drawing.folding import fold, tasks
+from firable.nets.drawing.part import taking_part
 from firable.nets.net import Net
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -80,6 +81,38 @@ def test_a_folded_task_is_a_double_circle_and_holds_the_token_of_any_place_in_it
     assert classes(svg, "place:robot.free") == ["place"]
 
 
+def test_some_controllers_alone_show_their_places_and_their_parts_with_who_else_takes_part() -> None:
+    net = catalogue_net("two_cells")
+    svg = ET.fromstring(draw_net(net, owners=["robot_a", "machine_a"]))
+    assert set(ids(svg, "lane")) == {"lane:robot_a", "lane:machine_a"}
+    assert {one.removeprefix("place:").split(".")[0] for one in ids(svg, "place")} == {"robot_a", "machine_a"}
+    taking = {f"transition:{t.name}" for t in net.transitions if taking_part(net, t) & {"robot_a", "machine_a"}}
+    assert set(ids(svg, "transition")) == taking
+    load = next(one for one in svg.iter() if one.get("id") == "transition:load_a")
+    words = [text.text for text in load.iter(f"{SVG}text")]
+    assert words == ["load_a", "start of loading MA", "also cell_a, conveyors"]
+
+
+def test_a_controller_alone_keeps_the_order_of_the_work_of_the_whole() -> None:
+    """Found by a line of cells: without what lies between, all its belts began at once, each on tracks of its own."""
+    net = catalogue_net("two_cells")
+    svg = ET.fromstring(draw_net(net, owners=["conveyors"]))
+    bars = {str(one.get("id")).split(":")[1]: one for one in svg.iter() if one.get("id", "").startswith("transition:")}
+    height = {name: float(next(bar.iter(f"{SVG}rect")).get("y", "")) for name, bar in bars.items()}
+    work = ["enter", "load_a", "fetched_a", "placed_a", "load_b", "fetched_b", "placed_b", "leave"]
+    assert sorted(work, key=height.__getitem__) == work
+
+
+def test_a_task_of_a_controller_alone_is_folded_and_what_it_shares_stays() -> None:
+    net = catalogue_net("two_cells")
+    alone, whole = (ET.fromstring(draw_net(net, owners=some, folded=["all"])) for some in (["robot_a"], None))
+    of_robot = {one for one in ids(whole, "place") if one.startswith("place:robot_a.")}
+    assert set(ids(alone, "place")) == of_robot
+    assert len(of_robot) < 7
+    shared = {f"transition:{t.name}" for t in net.transitions if {"robot_a"} < taking_part(net, t)}
+    assert shared <= set(ids(alone, "transition"))
+
+
 @examples(30)
 @given(whole_nets())
 def test_every_net_can_be_folded_and_wrapped_and_shows_all_the_rest_once(net: Net) -> None:
@@ -103,4 +136,4 @@ def test_lanes_that_are_too_wide_go_on_below_with_the_parts_of_their_transitions
     again = {one for one in ids(narrow, "transition") if one.count(":") == 2}
     assert again == {"transition:load_a:2", "transition:fetched_a:2", "transition:placed_a:2"}
     below = next(one for one in narrow.iter() if one.get("id") == "transition:load_a:2")
-    assert "also cell_a,…" in [text.text for text in below.iter(f"{SVG}text")]
+    assert [text.text for text in below.iter(f"{SVG}text")][-2:] == ["also cell_a,", "machine_a, robot_a"]

@@ -7,7 +7,7 @@ from firable.analysis import explore, report_on
 from firable.decompose.splitting.cut import split
 from firable.nets.catalogue import catalogue_net
 from firable.nets.catalogue.families import family_net
-from firable.nets.drawing import draw_coordinator, draw_net
+from firable.nets.drawing import draw_coordinator, draw_net, draw_overview
 from firable.nets.verdict import Status, Verdict, Witness
 
 
@@ -15,6 +15,8 @@ def test_a_net_and_its_split_show_their_pictures_unless_they_are_too_large() -> 
     net = catalogue_net("one_robot")
     assert net._repr_svg_() == draw_net(net)
     assert split(net)._repr_svg_() == draw_coordinator(split(net))
+    several = family_net("manufacturing_cells-150")
+    assert several._repr_svg_() == draw_overview(several)
     large = family_net("manufacturing_cells-400")
     assert large._repr_svg_() is None
     assert split(large)._repr_svg_() is None
