@@ -32,6 +32,12 @@ if TYPE_CHECKING:
     help="The plant file of the cell, or catalogue:NAME, for the top view.  [default: NAME.plant.yaml beside NET]",
 )
 @click.option(
+    "--controller",
+    metavar="NAME",
+    multiple=True,
+    help="Open this controller at first; repeatable.  [default: the whole net, or the overview of a large one]",
+)
+@click.option(
     "--collapse",
     metavar="NAME",
     multiple=True,
@@ -46,6 +52,7 @@ def view(
     net: str,
     trace: str | None,
     plant: str | None,
+    controller: tuple[str, ...],
     collapse: tuple[str, ...],
     port: int,
     read_only: bool,
@@ -59,7 +66,8 @@ def view(
     Edit on the page changes NET where it is a net file, and keeps its comments and its order; each edit is written to
     the file at once, if the file is a net with it, and can be undone. With --read-only nothing is edited.
 
-    The picture is that of `firable draw`, by the layout file beside NET where there is one.
+    The picture is that of `firable draw`, by the layout file beside NET where there is one. A large net begins with an
+    overview: its controllers, where their tokens are, and the transitions that they share; a click opens one of them.
 
     Top view shows the cell from above where a plant file says what it is made of.
 
@@ -67,7 +75,7 @@ def view(
     """
     import asyncio
 
-    from firable.cli.pictures import drawable, kept_layout, refuse_unknown
+    from firable.cli.pictures import kept_layout, refuse_unknown, viewable
     from firable.cli.text import show_diagnostic
     from firable.cli.view.drawing import Look
     from firable.cli.view.editing import editing_of
@@ -78,9 +86,9 @@ def view(
     from firable.semantics.trace import read_trace
 
     loaded = load_net(net)
-    drawable(loaded.net)
+    viewable(loaded.net, controller)
     refuse_unknown(loaded.net, collapse)
-    look = Look(kept_layout(loaded.net, net), collapse)
+    look = Look(kept_layout(loaded.net, net), collapse, controller)
     for note in loaded.notes:
         show_diagnostic(note)
     runs = []

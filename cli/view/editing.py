@@ -29,7 +29,7 @@ from firable.cli.view.drawing import Look
 from firable.cli.view.playing import Playing
 from firable.cli.view.site import answering, diagnostic_json, refusal
 from firable.nets.diagnostics import Diagnostic, InputError
-from firable.nets.drawing import NODES_MAX
+from firable.nets.drawing import NODES_MAX, has_overview
 from firable.nets.drawing.layout_file import SIZE_BYTES_MAX as LAYOUT_BYTES_MAX
 from firable.nets.drawing.layout_file import layout_path, parse_layout, renamed_layout
 from firable.nets.editing import edits
@@ -221,7 +221,8 @@ class Editing:
                 if (text := renamed_layout(source, names)) != source.text:
                     write_whole(path, text)
                 given = parse_layout(text, source.file)
-        look = Look(given, tuple(names.get(name, name) for name in look.folded))
+        folded, opened = (tuple(names.get(name, name) for name in some) for some in (look.folded, look.opened))
+        look = Look(given, folded, opened)
         self.playing.take(loaded, look, is_another=is_another)
 
     async def _shown(self) -> dict[str, Any]:
@@ -248,9 +249,9 @@ def editing_of(playing: Playing, argument: str, *, read_only: bool) -> Editing:
 
 
 def _read(source: Source) -> Loaded:
-    """The net of a text, small enough for a picture."""
+    """The net of a text, of which something can be shown."""
     net, positions = parse_positioned(source.text, source.file)
-    if (count := len(net.places) + len(net.transitions)) > NODES_MAX:
+    if (count := len(net.places) + len(net.transitions)) > NODES_MAX and not has_overview(net):
         message = f"{count:,} places and transitions make no picture that anybody can read"
         raise InputError([Diagnostic("F1020", message, f"edit a net of more than {NODES_MAX:,} in an editor of text")])
     return Loaded(net, positions=positions)

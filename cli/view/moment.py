@@ -19,6 +19,7 @@ from typing import Any
 from firable.cli.story import waits_told
 from firable.cli.view.site import refusal
 from firable.executor.operating.situation import Blocked
+from firable.nets.drawing.part import everybody, owners_of
 from firable.nets.net import Marking, Net
 from firable.semantics.player import Player
 from firable.semantics.waiting import circle
@@ -115,6 +116,7 @@ def _known(names: list[Any], index: Mapping[str, int]) -> bool:
 
 def structure(net: Net) -> dict[str, Any]:
     """What the page has to know of a net beside its picture: names, words and owners, and no rule."""
+    owners, taking = owners_of(net), everybody(net)
     return {
         "name": net.name,
         "description": net.description,
@@ -130,7 +132,10 @@ def structure(net: Net) -> dict[str, Any]:
             }
             for place in net.places
         ],
-        "transitions": [{"name": t.name, "says": t.description} for t in net.transitions],
+        "transitions": [
+            {"name": t.name, "says": t.description, "owners": [owner for owner in owners if owner in taking[t.name]]}
+            for t in net.transitions
+        ],
         "signals": [
             {
                 "name": signal.name,

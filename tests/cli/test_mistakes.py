@@ -146,6 +146,8 @@ def test_what_is_no_net_file_is_refused_at_once(tmp_path: Path, capsys: pytest.C
             "--controller is of --what net",
         ),
         (["view", "catalogue:machines-5000"], "20,000 places and transitions make no picture"),
+        (["view", "catalogue:counter-500"], "`firable split --suggest` proposes controllers for it"),
+        (["view", "catalogue:one_robot", "--controller", "robt"], "no controller 'robt'; did you mean 'robot'?"),
         (["draw", "catalogue:one_robot", "--marking", "robot.fre"], "no place 'robot.fre'"),
         (["draw", "catalogue:one_robot", "--marking", "robot.free", "--trace", "x"], "leave one out"),
         (["draw", "catalogue:one_robot", "--layout", "dot", "--width", "900"], "are of lanes"),

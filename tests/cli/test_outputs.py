@@ -37,7 +37,7 @@ WORDS = {
     "run": {"--certified", "--controller", "--listen", "--join", "--serial", "--say", "--serve"},
     "sim": {"--stuck", "--drop", "--hang"},
     "split": {"--own"},
-    "view": {"--collapse"},
+    "view": {"--collapse", "--controller"},
 }
 """The options and arguments that are words, and name no file."""
 

@@ -125,7 +125,7 @@ def test_pictures_are_drawn_once_and_the_last_are_kept(monkeypatch: pytest.Monke
     pictures = Pictures(net, Look(folded=("robot", "gone")))
     made: list[int] = []
 
-    def draw(folded: Collection[str]) -> str:
+    def draw(folded: Collection[str], _: object) -> str:
         made.append(len(folded))
         return str(made)
 

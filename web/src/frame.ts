@@ -62,6 +62,9 @@ export function frame(title: string, says: string, kind: string, drawing: Drawin
     h("button", { type: "button", "aria-label": "Smaller", click: () => picture.zoom(1 / 1.25) }, "−"),
     h("button", { type: "button", click: () => picture.fit() }, "Fit"),
     h("button", { type: "button", "aria-label": "Larger", click: () => picture.zoom(1.25) }, "+"),
+    drawing.openedBar,
+    drawing.overviewButton,
+    drawing.wholeButton,
     drawing.foldButton,
   );
   document.title = `${title} – firable`;

@@ -7,7 +7,7 @@
 import { h, svg } from "./dom";
 import { Flights, type Arc } from "./flights";
 import pictureStyle from "./picture.css?inline";
-import type { Drawn, Net, Wait } from "./server";
+import type { Drawn, Net, Owner, Wait } from "./server";
 
 export interface Shown {
   marking: Iterable<string>;
@@ -22,6 +22,8 @@ export interface Pressed {
   pointed?: (name: string | null) => void;
   /** A task that is drawn as one place. */
   task?: (name: string) => void;
+  /** A controller that is drawn as one line. */
+  controller?: (name: Owner) => void;
 }
 
 interface Gate {
@@ -36,10 +38,19 @@ interface Spot {
   label: string;
 }
 
+/** A controller in an overview: its line in each system, and what says where its tokens are. */
+interface Line {
+  groups: SVGGElement[];
+  held: SVGTextElement[];
+}
+
 /** So much of the top is left out: the title of the drawing stands in the head of the page. */
 const TITLE_HEIGHT = 56;
 /** Who moves the pointer by so many pixels between press and release drags the picture. */
 const DRAGGED = 5;
+/** So many characters say where the tokens of a controller are: as many as in the drawing. */
+const HELD_MAX = 20;
+const shortened = (text: string, characters: number): string => (text.length <= characters ? text : `${text.slice(0, characters - 1)}…`);
 const KINDS_OF_ARC = new Map([["input", false], ["output", true]]);
 
 export class Picture {
@@ -54,6 +65,12 @@ export class Picture {
   private readonly arcs = new Map<string, Arc[]>();
   private readonly gates = new Map<string, Gate[]>();
   private readonly flights = new Flights();
+  private readonly lines = new Map<Owner, Line>();
+  /** The owner of each place, and those who take part in each transition. */
+  private readonly owner = new Map<string, Owner>();
+  private readonly owners = new Map<string, Owner[]>();
+  /** What is fired in the run that is played. */
+  private passed: ReadonlySet<string> | null = null;
   /** The place that stands for a place inside a folded task. */
   private readonly within = new Map<string, string>();
   private width = 0;
@@ -82,12 +99,17 @@ export class Picture {
     this.note.replaceChildren(...words);
   }
 
-  /** Show a drawing; one that takes the place of another is as large, and stands where that one stood. */
-  draw(net: Net, drawn: Drawn): void {
+  get isDrawn(): boolean {
+    return this.drawing !== null;
+  }
+
+  /** Show a drawing; one that takes the place of another of the same is as large, and stands where that one stood. */
+  draw(net: Net, drawn: Drawn, isOther: boolean): void {
     this.net = net;
-    const isFirst = this.drawing === null;
     const hadFocus = this.root.activeElement !== null;
-    for (const map of [this.spots, this.bars, this.arcs, this.gates, this.within]) map.clear();
+    for (const map of [this.spots, this.bars, this.arcs, this.gates, this.lines, this.owner, this.owners, this.within]) map.clear();
+    for (const { name, owner } of net.places) this.owner.set(name, owner);
+    for (const { name, owners } of net.transitions) this.owners.set(name, owners);
     this.flights.end();
     this.drawing?.remove();
     const parsed = new DOMParser().parseFromString(drawn.picture, "image/svg+xml").documentElement;
@@ -97,15 +119,18 @@ export class Picture {
     drawing.setAttribute("role", "group");
     drawing.setAttribute("aria-label", `the net ${net.name}`);
     this.style.before(drawing);
-    this.prepare(drawing, drawn.members);
-    if (isFirst) this.fit();
-    else this.zoomTo(this.scale);
+    this.prepare(drawing, drawn);
+    if (isOther) {
+      this.fit();
+      this.element.scrollTo(0, 0);
+    } else this.zoomTo(this.scale);
+    this.passes(this.passed);
     this.showAll();
     if (this.chosen) this.bring(this.choose(...this.chosen));
     if (hadFocus) this.element.focus();
   }
 
-  private prepare(drawing: SVGSVGElement, members: Record<string, string[]>): void {
+  private prepare(drawing: SVGSVGElement, { members, owners }: Drawn): void {
     for (const [task, places] of Object.entries(members)) for (const place of places) this.within.set(place, task);
     const says = new Map([...this.net.places, ...this.net.transitions].map((one) => [one.name, one.says]));
     for (const part of drawing.querySelectorAll<SVGElement>("[id]")) {
@@ -114,8 +139,22 @@ export class Picture {
       if (kind === "place" && part instanceof SVGGElement) this.place(name, part, says.get(name) ?? "", members[name]);
       else if (kind === "transition" && part instanceof SVGGElement) this.transition(name, part, says.get(name) ?? "");
       else if (kind === "gate" && part instanceof SVGGElement) this.gate({ signal: names[1]!, wanted: names.length < 3, group: part }, name);
+      else if (kind === "controller" && part instanceof SVGGElement) this.line(name || null, part, owners);
       else if (KINDS_OF_ARC.has(kind!) && part instanceof SVGPathElement) this.of(this.arcs, name).push({ path: part, backwards: KINDS_OF_ARC.get(kind!)! });
     }
+  }
+
+  private line(owner: Owner, group: SVGGElement, owners: Owner[]): void {
+    const line = this.lines.get(owner) ?? { groups: [], held: [] };
+    this.lines.set(owner, line);
+    line.groups.push(group);
+    line.held.push(group.querySelector<SVGTextElement>(".held")!);
+    group.classList.add("controller");
+    group.setAttribute("role", "img");
+    if (line.groups.length > 1) group.setAttribute("aria-hidden", "true"); // it stands in a system above, too
+    if (!owners.includes(owner)) return; // it owns nothing that could be drawn
+    this.pressed(group, () => this.pressing.controller?.(owner));
+    group.setAttribute("tabindex", "-1"); // who goes by Tab finds them in the list of those to open
   }
 
   private of<T>(map: Map<string, T[]>, name: string): T[] {
@@ -142,8 +181,9 @@ export class Picture {
 
   private transition(name: string, group: SVGGElement, says: string): void {
     for (const bar of group.querySelectorAll<SVGRectElement>("rect.bar")) {
-      const [x, y, width, height] = ["x", "y", "width", "height"].map((key) => Number(bar.getAttribute(key)));
-      bar.before(svg("rect", { class: "hit", x: x! - 5, y: y! - 7, width: width! + 10, height: height! + 14, rx: 7 }));
+      const [x = 0, y = 0, width = 0, height = 0] = ["x", "y", "width", "height"].map((key) => Number(bar.getAttribute(key)));
+      const [across, along] = height > width ? [3, 3] : [5, 7];
+      bar.before(svg("rect", { class: "hit", x: x - across, y: y - along, width: width + 2 * across, height: height + 2 * along, rx: across + 2 }));
     }
     group.classList.add("transition");
     group.setAttribute("data-says", says);
@@ -221,6 +261,7 @@ export class Picture {
     for (const name of held) if (!this.held.has(name)) this.showToken(name, true);
     for (const name of this.held) if (!held.has(name)) this.showToken(name, false);
     this.held = held;
+    this.showLines();
     const on = new Set(shown.signals);
     const turned = on.size !== this.on.size || [...on].some((one) => !this.on.has(one));
     this.on = on;
@@ -230,6 +271,7 @@ export class Picture {
   private showAll(): void {
     this.held = this.holding(this.marking);
     for (const name of this.spots.keys()) this.showToken(name, this.held.has(name));
+    this.showLines();
     this.on = new Set(this.signals);
     this.showGates();
     for (const [name, wait] of this.waits) this.showBar(name, wait);
@@ -246,6 +288,23 @@ export class Picture {
     if (spot === undefined) return;
     spot.token.classList.toggle("there", there);
     spot.group.setAttribute("aria-label", there ? `${spot.label}, with a token` : spot.label);
+  }
+
+  /** In an overview: on which place the tokens of each controller are, and on how many more. */
+  private showLines(): void {
+    if (this.lines.size === 0) return;
+    const held = new Map<Owner, string[]>();
+    for (const place of this.marking) {
+      const owner = this.owner.get(place) ?? null;
+      held.set(owner, [...(held.get(owner) ?? []), owner !== null && place.startsWith(`${owner}.`) ? place.slice(owner.length + 1) : place]);
+    }
+    for (const [owner, { groups, held: texts }] of this.lines) {
+      const on = held.get(owner) ?? [];
+      const more = on.length > 1 ? ` +${on.length - 1}` : "";
+      const words = on.length > 0 ? shortened(on[0]!, HELD_MAX - more.length) + more : "";
+      for (const text of texts) if (text.textContent !== words) text.textContent = words;
+      groups[0]!.setAttribute("aria-label", `${owner ?? "no controller"}, ${on.length > 0 ? `tokens on ${on.join(", ")}` : "no token"}`);
+    }
   }
 
   private showGates(): void {
@@ -279,14 +338,28 @@ export class Picture {
 
   /** Let tokens run along the arcs of what has fired. */
   fly(fired: Iterable<string>): void {
-    for (const name of fired) this.flights.fly(this.bars.get(name) ?? [], this.arcs.get(name) ?? []);
+    for (const name of fired) this.flights.fly([...(this.bars.get(name) ?? []), ...this.linesOf(name)], this.arcs.get(name) ?? []);
+  }
+
+  /** In an overview: the lines of those who take part in a transition. */
+  private linesOf(name: string): SVGGElement[] {
+    return (this.owners.get(name) ?? []).flatMap((owner) => this.lines.get(owner)?.groups ?? []);
+  }
+
+  /** In an overview: set off what a run passes through from all that it leaves alone; null sets nothing off. */
+  passes(fired: ReadonlySet<string> | null): void {
+    this.passed = fired;
+    this.drawing?.classList.toggle("passing", fired !== null && this.lines.size > 0);
+    for (const [name, bars] of this.bars) for (const bar of bars) bar.classList.toggle("passed", fired?.has(name) ?? false);
+    const passed = new Set([...(fired ?? [])].flatMap((name) => this.linesOf(name)));
+    for (const { groups } of this.lines.values()) for (const group of groups) group.classList.toggle("passed", passed.has(group));
   }
 
   // How large it is shown, and what of it
 
   /** Scroll to what has fired, if nothing of it is in sight. */
   reveal(fired: Iterable<string>): void {
-    this.bring([...fired].flatMap((name) => this.bars.get(name) ?? []));
+    this.bring([...fired].flatMap((name) => this.bars.get(name) ?? this.linesOf(name).slice(0, 1)));
   }
 
   private bring(parts: Element[]): void {

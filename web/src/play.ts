@@ -30,6 +30,7 @@ const STEPS_SHOWN = 200;
 const inCode = (words: string): (Node | string)[] => words.split("`").map((part, i) => (i % 2 === 1 ? h("code", {}, part) : part));
 
 export class Play {
+  private readonly drawing: Drawing;
   private readonly picture: Picture;
   private readonly top: TopView;
   private readonly frame: Frame;
@@ -57,7 +58,7 @@ export class Play {
     private readonly to: Leaving,
   ) {
     for (const { name, says } of page.net.transitions) this.words.set(name, says);
-    const drawing = new Drawing(page.net, {
+    const drawing = this.drawing = new Drawing(page.net, {
       transition: (name) => void this.fire(name),
       signal: (name) => void this.toggle(name),
       pointed: (name) => this.picture.mark(name ?? this.explained),
@@ -397,7 +398,7 @@ export class Play {
         const moment = await ask<Moment>("api/moment", { ...at, shown: this.page.shown });
         if (moment.top) this.top.show(moment.top);
         return moment;
-      }, (here) => this.ended(here));
+      }, (here) => this.ended(here), this.drawing.owners.length > 0 ? () => void this.openOf(run) : null);
       this.frame.below.replaceChildren(this.playback.element);
       this.frame.side.classList.add("playing");
       this.frame.status.className = "status";
@@ -405,6 +406,13 @@ export class Play {
       for (const button of this.frame.tools.querySelectorAll("button")) button.disabled = true;
       this.playback.begin();
     }, true);
+  }
+
+  /** Draw the controllers that take part in what a run fires. */
+  private openOf(run: Run): Promise<void> {
+    const fired = new Set(run.frames.flatMap((frame) => frame.fired ?? []));
+    const taking = new Set(this.page.net.transitions.filter(({ name }) => fired.has(name)).flatMap(({ owners }) => owners));
+    return this.drawing.open(this.drawing.owners.filter((owner) => taking.has(owner)));
   }
 
   private ended(here: Moment | null): void {

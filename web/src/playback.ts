@@ -29,6 +29,8 @@ export class Playback {
     private readonly picture: Picture,
     private readonly moments: (at: At) => Promise<Moment>,
     private readonly end: (here: Moment | null) => void,
+    /** Draw the controllers that the run passes through; none where there is nothing but the whole net. */
+    open: (() => void) | null,
   ) {
     const last = run.frames.length - 1;
     this.slider = h("input", {
@@ -47,6 +49,7 @@ export class Playback {
         button("→", "One step on", () => this.show(this.at + 1)),
         button("▶|", "To the end", () => this.show(last)),
         this.slider,
+        open && h("button", { type: "button", title: "Draw the controllers that this run passes through", click: open }, "Open its controllers"),
         h("button", { type: "button", click: () => this.close(true) }, "Go on from here"),
         h("button", { type: "button", click: () => this.close(false) }, "Close"),
       ),
@@ -57,6 +60,7 @@ export class Playback {
   }
 
   begin(): void {
+    this.picture.passes(new Set(this.run.frames.flatMap((frame) => frame.fired ?? [])));
     this.show(0);
     this.slider.focus();
   }
@@ -126,6 +130,7 @@ export class Playback {
   /** Another run takes its place. */
   stop(): void {
     this.pause();
+    this.picture.passes(null);
     this.asked++;
   }
 

@@ -54,20 +54,29 @@ export interface Signal {
   gates: string[];
 }
 
+/** A controller, or null for what nobody owns. */
+export type Owner = string | null;
+
 export interface Net {
   name: string;
   description: string;
   controllers: string[];
   places: Place[];
-  transitions: { name: string; says: string }[];
+  transitions: { name: string; says: string; owners: Owner[] }[];
   signals: Signal[];
 }
 
-/** The picture of a net, its folded tasks with the places inside them, and what can be folded. */
+/** The picture of a net, its folded tasks with the places inside them, what can be folded, and what is opened and can be. */
 export interface Drawn {
   picture: string;
   members: Record<string, string[]>;
   foldable: string[];
+  /** The controllers that are drawn; none in an overview. */
+  opened: Owner[];
+  /** Those that can be opened, where the net has an overview. */
+  owners: Owner[];
+  /** Whether all can be opened at once. */
+  whole: boolean;
 }
 
 export interface RunSummary {
