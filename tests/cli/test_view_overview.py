@@ -90,8 +90,9 @@ def test_a_small_net_begins_whole_and_a_command_says_what_a_net_begins_with() ->
 def test_of_a_net_of_one_controller_the_whole_is_drawn_and_no_overview_is_offered() -> None:
     pictures = Pictures(family_net("counter-100"), Look())  # 201 places and transitions
     assert (answer(pictures)["opened"], answer(pictures)["owners"]) == (["counter"], [])
-    for how in ({}, {"opened": []}):
-        empty = answer(Pictures(Net("empty"), Look()), **how)
+    opened: list[str] | None
+    for opened in (None, []):
+        empty = answer(Pictures(Net("empty"), Look()), opened=opened)
         assert (empty["opened"], empty["owners"]) == ([], [])
         assert empty["picture"].startswith("<svg")
 
@@ -123,7 +124,12 @@ def test_what_cannot_be_opened_is_refused(name: str, wrong: object, words: str) 
 def test_each_choice_of_controllers_is_drawn_once_and_the_last_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     pictures = Pictures(family_net("manufacturing_cells-80"), Look())
     made: list[object] = []
-    monkeypatch.setattr(pictures, "_drawn", lambda _, opened: made.append(opened) or str(opened))
+
+    def draw(_: object, opened: object) -> str:
+        made.append(opened)
+        return str(opened)
+
+    monkeypatch.setattr(pictures, "_drawn", draw)
     for _ in range(2):
         assert answer(pictures, opened=["r2", "r1"])["picture"] == "('r1', 'r2')"
         assert answer(pictures)["picture"] == "()"
@@ -200,6 +206,41 @@ def test_an_overview_is_played_and_says_where_the_tokens_are(chromium: Browser, 
         held(page, "p1").to_have_text("eating")
         held(page, "p2").to_have_text("thinking")
         expect(page.locator(".picture svg")).not_to_contain_class("passing")
+
+
+@needs_browser
+def test_who_points_at_a_controller_sees_with_whom_it_shares_what(chromium: Browser, table: str) -> None:
+    with page_at(chromium, table) as page:
+        beside = page.locator(".beside")
+        page.locator('[id="controller:p4"] .name').hover()
+        expect(beside).to_have_count(7)
+        ids = beside.evaluate_all("all => all.map(one => one.id).sort()")
+        assert ids == [
+            *(f"controller:p{i}" for i in (3, 4, 5)),
+            *(f"transition:p{i}_{what}" for i in (3, 4) for what in ("gives", "takes_right")),
+        ]
+        page.locator('[id="transition:p3_gives"] rect.hit').first.hover()
+        expect(beside).to_have_count(2)
+        page.locator("h1").hover()
+        expect(beside).to_have_count(0)
+
+
+@needs_browser
+def test_what_is_chosen_to_be_edited_has_its_controller_opened(chromium: Browser, tmp_path: Path) -> None:
+    path = tmp_path / "large.firable.yaml"
+    assert main(["convert", LARGE, "-o", str(path)]) == 0
+    with command("view", path, "--no-browser") as (address, _), page_at(chromium, address) as page:
+        page.get_by_role("button", name="Edit").click()
+        page.locator('[id="transition:s2_load"] rect.hit').first.click()
+        expect(page.get_by_label("Chosen")).to_have_value(re.compile("s2_load"))
+        expect(page.locator('[id="controller:r1"]')).to_be_visible()  # what is shared is in sight there
+        page.get_by_label("Chosen").select_option(label="r4.free")
+        expect(page.locator('[id="place:r4.free"]')).to_contain_class("chosen")
+        chosen = page.locator(".panel").filter(has=page.get_by_role("heading", name="Chosen"))
+        chosen.get_by_label("Name").fill("idle")
+        page.keyboard.press("Enter")
+        expect(page.locator('[id="place:r4.idle"]')).to_contain_class("chosen")
+        expect(page.locator('[id^="lane:"]')).to_have_count(1)
 
 
 @needs_browser

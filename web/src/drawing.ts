@@ -89,6 +89,16 @@ export class Drawing {
     if (await this.drawn(opened, this.folded)) announce(words);
   }
 
+  /** Open the controller of a place or transition that is not drawn. */
+  bringIn(kind: string, name: string): void {
+    const { opened, net } = this;
+    if (opened === null || opened === "whole") return;
+    const places = net.places.filter((one) => kind === "place" && one.name === name).map((one) => one.owner);
+    const owners = [...places, ...net.transitions.filter((one) => kind === "transition" && one.name === name).flatMap((one) => one.owners)];
+    const isShared = opened.length === 0 && owners.length > 1;
+    if (owners.length > 0 && !isShared && !owners.some((owner) => opened.includes(owner))) void this.open([...opened, owners[0]!]);
+  }
+
   private showOpened({ opened, owners, whole }: Drawn): void {
     const isWhole = this.opened === "whole";
     const hadFocus = this.openedBar.contains(document.activeElement);

@@ -153,7 +153,9 @@ export class Edit {
     const transitions = Object.fromEntries(page.net.transitions.map(({ name }) => [name, { may: "not" as const }]));
     this.drawing.picture.show({ marking: state.marked, signals: [], transitions });
     this.details.show(page.net, state);
-    this.drawing.picture.choose(this.details.chosen?.kind ?? "", this.details.chosen?.name ?? "");
+    const { kind = "", name = "" } = this.details.chosen ?? {};
+    this.drawing.picture.choose(kind, name);
+    this.drawing.bringIn(kind, name);
   }
 
   private choose(chosen: Chosen | null): void {

@@ -152,9 +152,17 @@ export class Picture {
     group.classList.add("controller");
     group.setAttribute("role", "img");
     if (line.groups.length > 1) group.setAttribute("aria-hidden", "true"); // it stands in a system above, too
+    const meets = [...this.owners].filter(([, some]) => some.includes(owner)).map(([name]) => name);
+    this.setsOff(group, () => meets.flatMap((name) => [...(this.bars.get(name) ?? []), ...this.linesOf(name)]));
     if (!owners.includes(owner)) return; // it owns nothing that could be drawn
     this.pressed(group, () => this.pressing.controller?.(owner));
     group.setAttribute("tabindex", "-1"); // who goes by Tab finds them in the list of those to open
+  }
+
+  /** In an overview: who points at a part sees what it has to do with. */
+  private setsOff(part: SVGGElement, of: () => SVGGElement[]): void {
+    for (const [kind, isOn] of [["pointerenter", true], ["pointerleave", false]] as const)
+      part.addEventListener(kind, () => of().forEach((one) => one.classList.toggle("beside", isOn)));
   }
 
   private of<T>(map: Map<string, T[]>, name: string): T[] {
@@ -192,6 +200,7 @@ export class Picture {
     if (this.pressing.transition) this.pressed(group, () => this.pressing.transition?.(name));
     for (const kind of ["pointerenter", "focus"]) group.addEventListener(kind, () => this.pressing.pointed?.(name));
     for (const kind of ["pointerleave", "blur"]) group.addEventListener(kind, () => this.pressing.pointed?.(null));
+    this.setsOff(group, () => this.linesOf(name));
     const all = this.of(this.bars, name);
     if (all.length > 0) group.setAttribute("aria-hidden", "true"); // it stands in the panel of other controllers, too
     all.push(group);
