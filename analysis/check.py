@@ -340,8 +340,8 @@ class _Check:
     def _held_explicitly(self, ends: dict[str, ReachabilityGraph], limits: Limits) -> StateSpace[Any]:
         """The graph; one that is not whole `ends` is given, by the reason why the engine ended.
 
-        For each property that is always possible again it would look at every marking, which takes part of the time that
-        they took to be found; a diagram looks at all of them at once. So where there are many, it is waited for.
+        For each property that is always possible again it would look at every marking, which takes part of the time
+        that they took to be found; a diagram looks at all of them at once. So where there are many, it is waited for.
         """
         began = monotonic()
         budget = replace(self.budget, memory_bytes=limits.memory_bytes, seconds=None)

@@ -78,20 +78,27 @@ def test_what_is_met_from_a_home_marking_is_always_possible_and_from_another_it_
 def test_what_holds_in_every_deadlock_is_always_possible_where_every_run_can_end() -> None:
     asked = Property("p", PropertyKind.ALWAYS_POSSIBLE, Holds("b"))
     of = replace(net("way", "a", ("a", "b")), properties=(asked,))
-    ends, holds = Claim(ClaimKind.ALWAYS_POSSIBLE, Deadlock()), And((Deadlock(), Not(Holds("b"))))
+    ends = Claim(ClaimKind.ALWAYS_POSSIBLE, Deadlock())
+
+    def always(text: str) -> Claim:
+        return Claim(ClaimKind.CTL, parse_temporal(text))
 
     def enough(*claims: Claim) -> bool:
         return suffices(of, Discipline.INTERLEAVING, "property.p", True, claims, None)
 
-    assert enough(ends, Claim(ClaimKind.NEVER, holds))
+    holds = always("AG (not deadlock or b)")
+    assert enough(ends, holds)
     for claims in (
         (ends,),
-        (Claim(ClaimKind.NEVER, holds),),
-        (replace(ends, kind=ClaimKind.REACHABLE), Claim(ClaimKind.NEVER, holds)),
-        (replace(ends, goal=Holds("a")), Claim(ClaimKind.NEVER, holds)),
-        (ends, Claim(ClaimKind.NEVER, And((Deadlock(), Not(Holds("a")))))),
-        (ends, Claim(ClaimKind.NEVER, And((Deadlock(), Holds("b"))))),
-        (ends, Claim(ClaimKind.REACHABLE, holds)),
+        (holds,),
+        (replace(ends, kind=ClaimKind.REACHABLE), holds),
+        (replace(ends, goal=Holds("a")), holds),
+        (ends, always("AG (not deadlock or a)")),
+        (ends, always("AG (not deadlock or not b)")),
+        (ends, always("AG (deadlock or b)")),
+        (ends, always("EG (not deadlock or b)")),
+        (ends, always("AF (not deadlock or b)")),
+        (ends, replace(holds, kind=ClaimKind.LTL)),
     ):
         assert not enough(*claims)
 

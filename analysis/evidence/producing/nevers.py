@@ -64,10 +64,6 @@ class Nevers:
         more = less or self._on_diagram(goal) or self._on_many(goal) or self._projected(goal, ROOM)
         return more or self._induced(goal)
 
-    def at_hand(self, goal: Formula) -> Labelling | None:
-        """All markings, where these are at hand and show that a goal is never met."""
-        return self._listed(goal) or self._on_diagram(goal)
-
     def contact_excluded(self) -> NeverCertificate | None:
         """What shows that the net is contact-free."""
         return self.certificate(self._contact_goal)

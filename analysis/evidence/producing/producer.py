@@ -26,7 +26,7 @@ from firable.analysis.evidence.meaning import (
     competing,
     completions_clash,
     contact,
-    deadlock_without,
+    in_each_deadlock,
     never_beside,
     property_claim,
     senders,
@@ -361,11 +361,8 @@ class _Verdicts:
         """That a goal is always possible, since some deadlock is, and the goal holds in each; raises `LackingError`."""
         if isinstance(self._ends_shown, str):
             raise LackingError(self._ends_shown)
-        never = deadlock_without(goal)
-        all_ = self.certifier.nevers.at_hand(never)
-        if all_ is None:
-            raise LackingError("that the goal holds in every deadlock is not certified")
-        return [self._ends_shown, (Claim(ClaimKind.NEVER, never), all_)]
+        holds = in_each_deadlock(goal)
+        return [self._ends_shown, (holds, self.certifier.certify(holds))]
 
     def _temporal(
         self, logic: Logic | QueryKind, formula: Temporal, verdict: Verdict, proved: bool
