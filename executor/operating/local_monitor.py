@@ -143,6 +143,9 @@ def _of_one(decomposition: Decomposition, name: str, model: PlantModel, latency_
     update["departures"] = [departure for departure in model.departures if departure.station in near]
     others_at = sorted((touched | ends | set(unknown)) & near)
     local = model.model_copy(update=update)
+    # Whether a workpiece was machined is told apart only where a machine here does that.
+    full = {at: kind if local.machines_workpieces else "raw" for at, kind in model.full_at_first.items() if at in near}
+    local = local.model_copy(update={"full_at_first": full})
     return Monitor(subnet, local, latency_seconds=latency_seconds, elsewhere=others_at)
 
 
