@@ -47,3 +47,15 @@ def test_choice_that_meets_its_claims_is_maximal_and_without_conflict(data: st.D
             assert all(n == 1 for n in taken.values())
             refused = [t for t in names if assignment[f"enabled({t})"] and t not in granted]
             assert all(any(place in taken for place in whole.places.get(t, ())) for t in refused)
+
+
+def test_who_fills_a_place_does_not_compete_with_who_takes_from_it() -> None:
+    """Each would be refused for the sake of one that can never fire with it."""
+    filling = (Transition("one", ("p",), ("r",)), Transition("other", ("q",), ("r",)))
+    taking = (Transition("this", ("r",), ("x",)), Transition("that", ("r",), ("y",)))
+    net = Net("n", tuple(map(Place, "pqrxy")), (*filling, *taking))
+    competition = Competition.of([(net, lambda t: net.transitions[t].name)])
+    assert list(competition.at.values()) == [["this", "that"], ["one", "other"]]
+    for t in (*filling, *taking):
+        assert [t.name in competition.at[place] for place in competition.places[t.name]] == [True]
+        assert competition.inputs.get(t.name, []) == (competition.places[t.name] if t in taking else [])

@@ -292,6 +292,7 @@ def test_decider_in_a_net_of_one_layer_is_refuted() -> None:
     of_group = replace(decomposition, groups=(replace(groups[0], at="b"), *groups[1:]))
     for elsewhere in (of_row, of_group):
         assert set(refuted(elsewhere)) == {"arbitration"}
+    assert refuted(replace(decomposition, coordinated=(replace(rows[0], at="a"), *rows[1:]))) == {}, "it is the one"
 
 
 def test_place_under_the_wrong_owner_is_refuted() -> None:
