@@ -59,3 +59,18 @@ def test_who_fills_a_place_does_not_compete_with_who_takes_from_it() -> None:
     for t in (*filling, *taking):
         assert [t.name in competition.at[place] for place in competition.places[t.name]] == [True]
         assert competition.inputs.get(t.name, []) == (competition.places[t.name] if t in taking else [])
+
+
+def test_first_of_those_enabled_from_the_turn_on_is_granted() -> None:
+    names = ["one", "two", "three"]
+    net = Net("n", (Place("p"),), tuple(Transition(name, ("p",)) for name in names))
+    terms = Terms()
+    steps = Steps(terms)
+    chosen = choice(terms, steps, names, (), Competition.of([(net, names.__getitem__)]), turns=True)
+    for turn, enabled in product(range(3), product((False, True), repeat=3)):
+        its = dict(zip(names, enabled, strict=True))
+        assignment = {f"enabled({t})": so for t, so in its.items()} | {f"turn({i})": i == turn for i in range(3)}
+        for is_so in steps.definitions():
+            assignment[is_so.operands[0].name] = value(is_so.operands[1], assignment)
+        granted = [t for t in names if value(chosen.granted[t], assignment)]
+        assert granted == [t for t in names[turn:] + names[:turn] if its[t]][:1]
