@@ -20,70 +20,87 @@ if TYPE_CHECKING:
 
 S = TypeVar("S")
 
+SEARCHES: Final = 3
+"""So many searches through a space find one component that is no deadlock, as a rule."""
+COMPONENTS_MAX: Final = 16
+"""So many that are no deadlocks are kept at most: a space may have as many as it has markings."""
+FIRINGS_MAX: Final = 500
+"""A longer run into a component says less than the shortest one to where a goal is lost, which a search finds."""
 _SHARE: Final = 0.5
-"""The part of the time of one question that further components may take, so that it can be answered without them."""
+"""The part of the time of one question that components and runs may take, so that it can be answered without them."""
 
 
 class Bottoms(Generic[S]):
     """The bottom components of a whole state space, found as goals are asked about.
 
-    At most `most` that are no deadlocks are looked for: a space may have as many as it has markings.
+    At most `most` that are no deadlocks are looked for.
     """
 
     def __init__(self, space: StateSpace[S], most: int) -> None:
-        self._space, self._most = space, most
-        self._dead: list[tuple[Marking, Witness]] = []  # deadlocks, with a run to each
-        self._others: list[S] = []  # components that are no deadlocks
-        self._runs: dict[int, Witness | None] = {}  # into some of these
+        self._space, self._most = space, min(most, COMPONENTS_MAX)
+        self._others: list[S] = []  # those that are no deadlocks
         self._left: S | None = None  # from where none that was found can be reached
+        self._runs: list[tuple[Marking, Witness]] = []  # into components
+        self._has_time, self._has_runs = True, True
 
-    def where_lost(self, goal: S) -> Witness | None:
-        """A run from M0 to where a goal can never be reached again; None where no component that was found shows that.
+    def where_lost(self, goal: S) -> S | None:
+        """Markings of bottom components from which a goal can never be reached again, none where there are none.
 
-        Raises `IncompleteGraph` where not all markings are known.
+        None where it is not known, as not all components were found. Raises `IncompleteGraph` where not all markings
+        are known.
         """
         space, algebra = self._space, self._space.algebra
         space.require_complete()
-        for marking, witness in self._dead:
-            if not space.contains(goal, marking):
-                return witness
-        found = space.witness(algebra.conjunction([space.deadlocks, algebra.negation(goal)]))
-        if found is not None:
-            self._dead.append((space.net.marking(found.marking), found))
-            return found
+        dead = algebra.conjunction([space.deadlocks, algebra.negation(goal)])
+        if space.count(dead):
+            return dead
         at = 0
         while at < len(self._others) or self._finds_another():
             if not space.count(algebra.conjunction([self._others[at], goal])):
-                if at not in self._runs:
-                    self._runs[at] = space.witness(self._others[at])
-                return self._runs[at]
+                return self._others[at]
             at += 1
-        return None
+        return dead if self._left is not None and not space.count(self._left) else None
 
-    @property
-    def all_found(self) -> bool:
-        """Whether every run can be led into a component that was found: what none of them shows to be lost is not."""
-        return self._left is not None and not self._space.count(self._left)
+    def run_into(self, markings: S) -> Witness | None:
+        """A run from M0 into some of what `where_lost` has given; None where such runs are long, or none is found."""
+        for marking, run in self._runs:
+            if self._space.contains(markings, marking):
+                return run
+        found = None
+        if self._has_runs:
+            try:
+                with self._space.turn(_SHARE):
+                    found = self._space.witness(markings)
+            except BudgetExceeded:
+                pass  # nor is any other looked for
+        self._has_runs = found is not None and len(found.firings) <= FIRINGS_MAX
+        if found is None or not self._has_runs:
+            return None
+        self._runs.append((self._space.net.marking(found.marking), found))
+        return found
 
     def _finds_another(self) -> bool:
         """Find one more component that is no deadlock, if there is one, and it is worth it."""
-        space, algebra = self._space, self._space.algebra
         try:
-            with space.turn(_SHARE):
-                if self._left is None:
-                    home = algebra.disjunction(()) if space.count(space.deadlocks) else space.home()
-                    if space.count(home):
-                        self._others.append(home)
-                        self._left = algebra.disjunction(())
-                        return True
-                    self._left = algebra.negation(space.backward(space.deadlocks))
-                if self.all_found or len(self._others) >= self._most:
-                    return False
-                one = space.bottom_after(self._left)
-                led = algebra.negation(space.backward(one))
+            with self._space.turn(_SHARE):
+                return self._has_time and self._found_another()
         except BudgetExceeded:
-            self._most = 0
+            self._has_time = False  # for others neither
             return False
+
+    def _found_another(self) -> bool:
+        space, algebra = self._space, self._space.algebra
+        if self._left is None:
+            home = algebra.disjunction(()) if space.count(space.deadlocks) else space.home()
+            if space.count(home):
+                self._others.append(home)
+                self._left = algebra.disjunction(())
+                return True
+            self._left = algebra.negation(space.backward(space.deadlocks))
+        if not space.count(self._left) or len(self._others) >= self._most:
+            return False
+        one = space.bottom_after(self._left)
+        led = algebra.negation(space.backward(one))
         self._others.append(one)
         self._left = algebra.conjunction([self._left, led])
         return True

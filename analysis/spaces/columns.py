@@ -137,6 +137,7 @@ def first(markings: Column) -> int | None:
     return index if len(markings) and markings[index] else None
 
 
-def last(markings: Column) -> int:
-    """The highest marking of a set that is not empty."""
-    return len(markings) - 1 - int(np.argmax(markings[::-1]))
+def some(markings: Column) -> int:
+    """One marking of a set that is not empty, drawn at random, the same of the same set."""
+    among = np.flatnonzero(markings)
+    return int(among[np.random.default_rng(len(among)).integers(len(among))])

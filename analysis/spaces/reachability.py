@@ -297,11 +297,14 @@ class ReachabilityGraph(Derived["Column"]):
         return _column(self.engine.forward(sources.tobytes(), **self._limits))
 
     def one_of(self, markings: Column) -> Column:
-        """The set of one marking of a set that is not empty: the one that is furthest from M0, as good as any."""
-        from firable.analysis.spaces.columns import last
+        """The set of one marking of a set that is not empty, drawn at random, the same way each time.
+
+        One that is chosen by where it stands may be the worst: of a chain, the one that all others are reached from.
+        """
+        from firable.analysis.spaces.columns import some
 
         found = self.none()
-        found[last(markings)] = True
+        found[some(markings)] = True
         return found
 
     def endless(self, within: Column | None = None) -> Column:

@@ -20,7 +20,7 @@ from math import inf
 from typing import Any, Generic, Protocol, TypeVar
 
 from firable.analysis.deadline import Deadline
-from firable.analysis.spaces.bottoms import Bottoms
+from firable.analysis.spaces.bottoms import SEARCHES, Bottoms
 from firable.nets.formula import Formula
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import Cost, Witness
@@ -319,11 +319,8 @@ class Derived(Generic[S]):
 
     @cached_property
     def bottoms(self: StateSpace[S]) -> Bottoms[S]:
-        """The bottom components, as far as it is worth it to find them for the properties of the net.
-
-        One takes some three searches, and without them each property takes one.
-        """
-        return Bottoms(self, len(self.net.possibilities) // 3)
+        """The bottom components, as far as it is worth it to find them for the properties of the net."""
+        return Bottoms(self, len(self.net.possibilities) // SEARCHES)
 
     def marked_together(self: StateSpace[S], pairs: Sequence[tuple[int, int]]) -> Sequence[bool]:
         """For each pair of places, whether some marking found has a token on both."""

@@ -98,9 +98,10 @@ def _reachable(space: StateSpace[Any], of: Property) -> Answer:
 def _always_possible(space: StateSpace[Any], of: Property) -> Answer:
     goal, note = space.satisfying(of.formula), f"from here ({format_formula(of.formula)}) can never be reached again"
     if len(space.net.possibilities) > SEARCHED_MAX:
-        if (run := space.bottoms.where_lost(goal)) is not None:
-            return no((), replace(run, note=note))
-        if space.bottoms.all_found:
+        lost = space.bottoms.where_lost(goal)
+        if lost is not None and not space.count(lost):
             return yes()
+        if lost is not None and (run := space.bottoms.run_into(lost)) is not None:
+            return no((), replace(run, note=note))
     witness = space.witness(space.algebra.negation(space.backward(goal)), note)
     return yes() if witness is None else no((), witness)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from itertools import chain, combinations
+from functools import partial
+from itertools import chain, combinations, pairwise
+from typing import Any
 
 import networkx as nx
 import pytest
@@ -12,8 +15,11 @@ from hypothesis import strategies as st
 from support.examples import examples
 from support.ring_nets import ring_nets
 
+from firable.analysis._engine import BudgetExceeded
+from firable.analysis.spaces.bottoms import FIRINGS_MAX, SEARCHES
 from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
-from firable.analysis.spaces.space import WitnessError
+from firable.analysis.spaces.space import StateSpace, WitnessError
+from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.analysis.verdicts.leads_to import check_lasso
 from firable.analysis.verdicts.properties import SEARCHED_MAX, decide_property, statement
 from firable.nets.formula import Formula, parse_formula
@@ -25,24 +31,16 @@ from firable.semantics.player import FiringSet, Player, holds_in
 from firable.semantics.trace import Discipline
 
 STATED = [
-    *(
-        "a",
-        "b",
-        "not a",
-        "a and not b",
-        "a or b",
-        "start",
-        "deadlock",
-        "firable(t0)",
-        "not firable(t1)",
-        "false",
-        "true",
-    )
+    *("a", "b", "not a", "a and not b", "a or b", "start", "deadlock"),
+    *("firable(t0)", "not firable(t1)", "false", "true"),
 ]
 FORMULAS = st.sampled_from(STATED).map(parse_formula)
 SITUATIONS = st.tuples(ring_nets(signals=True), st.sampled_from(Discipline)).filter(
     lambda drawn: len(drawn[0].transitions) > 1
 )
+
+
+MANY = SEARCHED_MAX + 1
 
 
 def prop(kind: PropertyKind, p: Formula, q: Formula | None = None, fairness: Fairness = Fairness.WEAK) -> Property:
@@ -88,19 +86,31 @@ def test_properties_of_markings_are_decided_by_their_definitions(
             assert len(verdict.witness.firings) == min(away[m] for m in shown)
 
 
-@examples(75)
-@given(SITUATIONS)
-def test_of_many_properties_to_be_always_possible_the_same_hold(situation: tuple[Net, Discipline]) -> None:
-    net, discipline = situation
-    formulas = map(parse_formula, STATED)
-    stated = [replace(prop(PropertyKind.ALWAYS_POSSIBLE, of), name=f"x{i}") for i, of in enumerate(formulas)]
-    assert len(stated) > SEARCHED_MAX
-    many = explore(replace(net, properties=tuple(stated)), discipline)
-    truth = graph_of(net, discipline)
-    for of in stated:
+HELD: dict[str, Callable[[Net], StateSpace[Any]]] = {
+    "graph": explore,
+    "graph of steps": partial(explore, discipline=Discipline.STEP),
+    "diagram": explore_symbolically,
+}
+
+
+def many(net: Net, *texts: str) -> Net:
+    """The net with more properties to be always possible than are searched for one by one."""
+    formulas = [parse_formula(text) for text in texts]
+    assert len(formulas) > SEARCHED_MAX
+    stated = (replace(prop(PropertyKind.ALWAYS_POSSIBLE, of), name=f"x{i}") for i, of in enumerate(formulas))
+    return replace(net, properties=tuple(stated))
+
+
+@pytest.mark.parametrize("held", HELD)
+@examples(40)
+@given(net=ring_nets(signals=True).filter(lambda net: len(net.transitions) > 1))
+def test_of_many_properties_to_be_always_possible_the_same_hold(held: str, net: Net) -> None:
+    space = HELD[held](many(net, *STATED))
+    truth = graph_of(net, space.discipline)
+    for of in space.net.possibilities:
         good = satisfying(net, of.formula, set(truth))
         lost = {m for m in truth if not (nx.descendants(truth, m) | {m}) & good}
-        verdict = decide_property(many, of)
+        verdict = decide_property(space, of)
         assert verdict.status is (Status.VIOLATED if lost else Status.PROVED)
         assert (verdict.witness is not None) == bool(lost)
         if verdict.witness is not None:
@@ -108,7 +118,81 @@ def test_of_many_properties_to_be_always_possible_the_same_hold(situation: tuple
             assert verdict.witness.note.endswith("can never be reached again")
 
 
-def test_more_bottom_components_than_are_looked_for_leave_no_property_proved() -> None:
+def way(length: int, *rings: tuple[str, ...]) -> Net:
+    """A way up, from each place of it to one on a way down, and from the end of that into rings of places."""
+    up, down = [f"u{i}" for i in range(length)], [f"d{i}" for i in reversed(range(length))]
+    moves = [*pairwise(up), *pairwise(down), *zip(up, reversed(down), strict=True)]
+    moves += [pair for ring in rings for pair in (("d0", ring[0]), *zip(ring, (*ring[1:], ring[0]), strict=True))]
+    names = dict.fromkeys(name for pair in moves for name in pair)
+    places = tuple(Place(name, marked=name == "u0") for name in names)
+    return Net("way", places, tuple(Transition(f"t{i}", (a,), (b,)) for i, (a, b) in enumerate(moves)))
+
+
+def test_where_a_goal_is_lost_long_before_the_end_that_is_shown() -> None:
+    steps = [f"s{i}" for i in range(2 * FIRINGS_MAX)]
+    names = ["m0", *steps]
+    places = tuple(Place(name, marked=name == "m0") for name in names)
+    chain = Net("chain", places, tuple(Transition(f"t{a}", (a,), (b,)) for a, b in pairwise(names)))
+    for space in (explore(many(chain, *["m0"] * MANY)), explore_symbolically(many(chain, *["m0"] * MANY))):
+        for of in space.net.possibilities:
+            witness = decide_property(space, of).witness
+            assert witness is not None
+            assert len(witness.firings) == 1
+
+
+def test_a_bottom_component_at_the_end_of_a_long_way_is_found_in_few_searches(monkeypatch: pytest.MonkeyPatch) -> None:
+    net, searches = way(1000, ("a", "b"), ("c", "d")), list[int]()
+    forward = ReachabilityGraph.forward
+
+    def counted(graph: ReachabilityGraph, sources: Any) -> Any:
+        searches.append(1)
+        return forward(graph, sources)
+
+    monkeypatch.setattr(ReachabilityGraph, "forward", counted)
+    graph = explore(many(net, *["a or c"] * (MANY - 1), "a"))
+    assert [decide_property(graph, of).holds for of in graph.net.possibilities] == [True] * (MANY - 1) + [False]
+    assert 2 <= len(searches) < 60
+
+
+def test_components_that_take_too_long_are_looked_for_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun = list[int]()
+
+    def home(_: object) -> Any:
+        begun.append(1)
+        raise BudgetExceeded("the time was over")
+
+    monkeypatch.setattr(ReachabilityGraph, "home", home)
+    graph = explore(many(way(3, ("a", "b")), *["a"] * (MANY - 1), "u0"))
+    assert [decide_property(graph, of).holds for of in graph.net.possibilities] == [True] * (MANY - 1) + [False]
+    assert len(begun) == 1
+
+
+def test_a_run_that_takes_too_long_is_looked_for_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    net = Net("ends", (Place("m0", marked=True), Place("a")), (Transition("t", ("m0",), ("a",)),))
+    graph = explore(many(net, *["m0"] * MANY))
+    asked, witness = list[int](), ReachabilityGraph.witness
+
+    def first_too_late(space: ReachabilityGraph, targets: Any, note: str = "") -> Any:
+        asked.append(1)
+        if len(asked) == 1:
+            raise BudgetExceeded("the time was over")
+        return witness(space, targets, note)
+
+    monkeypatch.setattr(ReachabilityGraph, "witness", first_too_late)
+    assert not any(decide_property(graph, of).holds for of in graph.net.possibilities)
+    assert len(asked) == 1 + MANY
+
+
+def test_bottom_components_that_are_not_looked_for_leave_no_property_wrongly_proved(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found, bottom_after = list[int](), ReachabilityGraph.bottom_after
+
+    def counted(graph: ReachabilityGraph, markings: Any) -> Any:
+        found.append(1)
+        return bottom_after(graph, markings)
+
+    monkeypatch.setattr(ReachabilityGraph, "bottom_after", counted)
     choices = range(6)
     places = [Place("m0", marked=True), *(Place(f"{side}{i}") for i in choices for side in "ab")]
     enter = [Transition(f"enter{i}", ("m0",), (f"a{i}",)) for i in choices]
@@ -116,13 +200,11 @@ def test_more_bottom_components_than_are_looked_for_leave_no_property_proved() -
     back = [Transition(f"back{i}", (f"b{i}",), (f"a{i}",)) for i in choices]
     all_but = [" or ".join(f"b{i}" for i in choices if i != without) for without in choices]
     texts = [*all_but, " or ".join(f"b{i}" for i in choices), "a0 or not a0", "a0"]
-    stated = [
-        replace(prop(PropertyKind.ALWAYS_POSSIBLE, parse_formula(text)), name=f"x{i}") for i, text in enumerate(texts)
-    ]
-    assert SEARCHED_MAX < len(stated) < 3 * len(choices)
-    graph = explore(Net("choices", tuple(places), (*enter, *there, *back), properties=tuple(stated)))
-    verdicts = [decide_property(graph, of) for of in stated]
+    assert len(texts) < SEARCHES * len(choices)
+    graph = explore(many(Net("choices", tuple(places), (*enter, *there, *back)), *texts))
+    verdicts = [decide_property(graph, of) for of in graph.net.possibilities]
     assert [verdict.holds for verdict in verdicts] == [*(False for _ in choices), True, True, False]
+    assert len(found) == len(texts) // SEARCHES
 
 
 def recurs(net: Net, truth: nx.MultiDiGraph[Marking], among: frozenset[Marking], fairness: Fairness) -> bool:

@@ -139,12 +139,15 @@ def test_bottom_components_tell_of_every_goal_whether_it_is_lost_somewhere(
         goal = space.algebra.disjunction(mine for mine, _ in sets)
         again = oracle.backward(frozenset(drawn))
         for bottoms in (all_, few):
-            run = bottoms.where_lost(goal)
-            if run is not None:
+            lost = bottoms.where_lost(goal)
+            if lost is not None and space.count(lost):
+                run = bottoms.run_into(lost)
+                assert run is not None
+                assert space.contains(lost, net.marking(run.marking))
                 assert net.marking(run.marking) not in again
-            elif bottoms.all_found:
+            elif lost is not None:
                 assert again == frozenset(reached)
-            assert run is not None or bottoms.all_found or bottoms is few
+            assert lost is not None or bottoms is few
 
 
 @pytest.mark.parametrize("method", SPACES)
