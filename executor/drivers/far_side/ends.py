@@ -114,7 +114,7 @@ def binding_text(net: Net, ports: Mapping[str, str], sensed: Collection[str]) ->
         beat, tripped = layout.device("beat"), layout.device("tripped")
         lines.append(f"    heartbeat: {{write: {beat}, every_s: {HEARTBEAT_S:g}, tripped: {tripped}}}")
         lines.append(f"    safe: {{{layout.device('stop')}: true}}")
-        lines.append("    channels:")
+        lines += ["    channels:"] if own else []
         for name, i in own.items():
             points = ", ".join(f"{part}: {_word(layout.machine(name, i, part))}" for part in layout.parts)
             lines.append(f"      {_word(name)}: {{{points}}}")
