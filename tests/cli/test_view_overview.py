@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page, Route, expect
 from support.browser import PATIENCE_MS, browser, command, needs_browser, page_at
 
 from firable.cli.main import main
@@ -266,6 +266,23 @@ def test_what_a_run_passes_through_stands_out_and_is_opened(chromium: Browser, t
         expect(passed).to_have_count(4)
         page.locator(".playback").get_by_role("button", name="Close").click()
         expect(passed).to_have_count(0)
+
+
+@needs_browser
+def test_a_run_that_is_asked_for_before_the_net_is_drawn_opens_its_controllers_too(
+    chromium: Browser, tmp_path: Path
+) -> None:
+    trace, waiting = tmp_path / "run.trace.jsonl", list[Route]()
+    with trace.open("w", encoding="utf-8") as stream:
+        Trace.of_firings(load_net(TABLE).net, [("p4_takes_left",)], Discipline.INTERLEAVING).write(stream)
+    with command("view", TABLE, "--trace", trace, "--no-browser") as (address, _), page_at(chromium, address) as page:
+        page.route("**/api/picture", lambda route: waiting.append(route))
+        with page.expect_response("**/api/run"), page.expect_request("**/api/picture"):
+            page.reload()
+            page.get_by_role("button", name="▶ Play").click()
+        for route in waiting:
+            route.continue_()
+        expect(page.get_by_role("button", name="Open its controllers")).to_be_visible()
 
 
 @needs_browser

@@ -31,6 +31,8 @@ const inCode = (words: string): (Node | string)[] => words.split("`").map((part,
 
 export class Play {
   private readonly drawing: Drawing;
+  /** The first picture, without which nothing is played: which controllers can be opened comes with it. */
+  private readonly begun: Promise<boolean>;
   private readonly picture: Picture;
   private readonly top: TopView;
   private readonly frame: Frame;
@@ -66,7 +68,7 @@ export class Play {
     this.picture = drawing.picture;
     this.top = new TopView(page.top);
     this.frame = frame(page.net.name || "the net", page.net.description, "Playing", drawing, this.top);
-    void drawing.draw(page.net, null);
+    this.begun = drawing.draw(page.net, null);
     this.steps = [{ what: "the initial marking", moment: "scene" in page.top ? { ...page.moment, top: page.top } : page.moment }];
     const editButton = this.button("Edit", "Edit the net file", () => void this.beginEdit());
     this.frame.tools.append(this.undoButton, this.redoButton, this.resetButton, this.gatesSwitch, editButton);
@@ -392,7 +394,7 @@ export class Play {
 
   private async playRun(name: string): Promise<void> {
     await this.doing(async () => {
-      const run = await ask<Run>("api/run", { name });
+      const [run] = await Promise.all([ask<Run>("api/run", { name }), this.begun]);
       this.playback?.stop();
       this.playback = new Playback(run, this.picture, async (at) => {
         const moment = await ask<Moment>("api/moment", { ...at, shown: this.page.shown });
