@@ -395,7 +395,11 @@ def test_a_drill_that_votes_on_what_has_come_may_have_looked_while_the_table_was
     """Its station is empty then, and the table is asked later whether it has turned."""
     text = catalogue_path("index_table").read_text("utf-8")
     third, looks = text[text.index("  G3:") : text.index("  t1-a:")], "{from: drill.looking,"
-    fourth = third.replace("G3:", "G4:").replace("drill.looking]", "drill.empty]\n    unless: drill.part_there")
+    fourth = (
+        third.replace("G3:", "G4:")
+        .replace("number: 3", "number: 4")
+        .replace("drill.looking]", "drill.empty]\n    unless: drill.part_there")
+    )
     gated = third.replace("drill.looking]", "drill.clamping]\n    if: drill.part_there") + fourth
     without = "".join(line for line in text.splitlines(keepends=True) if looks not in line and "looking:" not in line)
     net = parse_net(without.replace(third, gated))
