@@ -75,8 +75,8 @@ _ALONE_SECONDS: Final = 0.1
 """How long techniques that hold all markings are alone, before others begin beside them."""
 _SPACES_SHARE: Final = 0.6  # of the time, for techniques that hold all markings
 _KNOWING_SECONDS_MAX: Final = 30.0  # for what is known at once
-_WAITED_SHARE: Final = 0.125  # of the time that a graph would take, for sets of markings that would take less
-_WAITED_SHARE_MAX: Final = 0.5  # of the time that is left, for the same
+_WAITED_SHARE: Final = 0.02  # of the time of exploring, for each property: so long it takes on a graph (0.015 to 0.03)
+_WAITED_SHARE_MAX: Final = 0.5  # of the time that is left, for a diagram to be there first
 _WAITED_TURN_SECONDS: Final = 0.02
 _SEEN_SHARE: Final = 0.25  # of the time that is left, for what the markings say that were found and are not all
 _COUNTING_SHARE: Final = 0.5  # of the time that is left, for all markings without a graph
