@@ -7,8 +7,12 @@
 //! some times the search of the winner, against a good chance to be a thousand times faster. Where memory becomes short,
 //! who stays beside the others gives way, then the largest search.
 //!
-//! Most nets are done in the first round in the first order that is made, so the others are made after it, and catch up:
-//! where another order would have been first by its arcs, it has lost to one that is done in no time.
+//! An order by units wins on most nets that take long, sometimes a hundred times sooner than all others, which nothing
+//! shows before: so it and its reverse have as much as all the others together, to the end. It never costs more than
+//! twice what it costs without them.
+//!
+//! Most nets are done in the first round in the first order that is made, so the others are made after it: where another
+//! order would have been first by its arcs, it has lost to one that is done in no time.
 //!
 //! Where a second processor is free, two searches run at a time from the second round on: most nets are done in the
 //! first, sooner than a thread begins. A round is the same as if they had run in turn: of those that end in it the first
@@ -27,7 +31,7 @@ use crate::net::Transition;
 /// The results that a search may compute in the first round, and more for each level.
 const FUEL: u64 = 1 << 15;
 const FUEL_PER_LEVEL: u64 = 16;
-/// How many times that each search has before the first drops out.
+/// How many times that the first has in its first round each search has before some drop out.
 const PATIENCE: u64 = 7;
 /// How many times less than the first of the last two the second gets, and how many times less those that stay beside
 /// them. These wait for some rounds, in which most leaders are done, and lose little by it: each round is as long as all
@@ -86,33 +90,41 @@ impl Race {
             rounds_settled: 0,
             apart: false,
         };
-        race.line_up(orders);
+        race.line_up(orders, 0);
         Ok(race)
     }
 
-    /// Makes these orders the field; a search that has begun in one of them has had its turn.
-    fn line_up(&mut self, orders: Vec<Order>) {
+    /// Makes these orders the field, in which a search that has begun goes on; the first of them are by units.
+    fn line_up(&mut self, orders: Vec<Order>, by_units: usize) {
         let mut begun = std::mem::take(&mut self.field);
         for order in orders {
             let racer = match begun.iter().position(|racer| racer.order == order) {
                 Some(at) => begun.swap_remove(at),
-                None => Racer { fuel: self.fuel, ..Racer::new(order) },
+                None => Racer::new(order),
             };
             self.field.push(racer);
         }
         for at in 0..self.field.len() {
-            self.field[at].is_shortest = at == 0 || self.field[at].is_reverse_of(&self.field[0]);
+            self.field[at].is_by_units = at < by_units;
+            self.field[at].is_shortest =
+                at == by_units || at > by_units && self.field[at].is_reverse_of(&self.field[by_units]);
         }
+    }
+
+    /// Makes the orders that the first one has not been quick enough for.
+    fn line_others_up(&mut self, others: Candidates, watch: &mut Watch<'_>) -> Result<(), Stop> {
+        let (first, others) = (others.first(), others.all(&self.transitions, &self.initial, watch)?);
+        // One that has given way does not come again.
+        let has_gone = |order: &Order| first.contains(order) && self.field.iter().all(|racer| racer.order != *order);
+        let [by_units, others] = others.map(|orders| orders.into_iter().filter(|order| !has_gone(order)).collect());
+        let count = Vec::len(&by_units);
+        self.line_up([by_units, others].concat(), count);
+        Ok(())
     }
 
     /// The net, without the searches.
     pub(super) fn into_net(self) -> (Vec<Transition>, Vec<u32>) {
         (self.transitions, self.initial)
-    }
-
-    /// Whether some drop out by now: most races are over before.
-    pub(super) fn is_long(&self) -> bool {
-        self.spent >= PATIENCE * self.first
     }
 
     /// Makes room when a search had none: who only stays beside the others gives way, else the largest.
@@ -121,7 +133,7 @@ impl Race {
     fn give_way(&mut self, at: usize) -> usize {
         let largest = (0..self.field.len()).max_by_key(|&other| self.field[other].bytes()).unwrap_or(at);
         self.field[at].begun = None;
-        if self.settled && !self.field[at].spared && running(&self.field) < self.field.len() {
+        if self.settled && !self.field[at].spared && self.field.iter().any(|racer| racer.spared) {
             self.field.retain(|racer| !racer.spared); // they stand after the others
             return at;
         }
@@ -133,14 +145,20 @@ impl Race {
     /// Gives each search what it may compute in this round.
     fn hand_out(&mut self) {
         let are_last = self.others.is_none() && running(&self.field) <= FINALISTS;
-        for (at, racer) in self.field.iter_mut().enumerate() {
+        let (mut leads, mut all) = (true, 0);
+        for racer in self.field.iter_mut().filter(|racer| !racer.is_by_units) {
             racer.fuel = match racer.spared {
                 true if self.settled && self.rounds_settled < ROUNDS_ALONE => 0,
                 true if self.settled => self.fuel / BESIDE,
-                false if at > 0 && are_last => self.fuel / RUNNER_UP,
+                false if !leads && are_last => self.fuel / RUNNER_UP,
                 _ => self.fuel,
             };
+            leads = false;
+            all += racer.fuel;
         }
+        let by_units = self.field.iter().filter(|racer| racer.is_by_units).count() as u64;
+        let share = all.max(self.fuel) / by_units.max(1);
+        self.field.iter_mut().filter(|racer| racer.is_by_units).for_each(|racer| racer.fuel = share);
     }
 
     /// The bytes that all searches hold.
@@ -181,6 +199,11 @@ impl Race {
 
     /// Goes on for a round; the markings, if a search has ended in it. Out of memory where none is left.
     pub(super) fn round(&mut self, bytes: usize, watch: &mut Watch<'_>) -> Result<Option<Symbolic>, Stop> {
+        if self.spent > 0
+            && let Some(others) = self.others.take()
+        {
+            self.line_others_up(others, watch)?;
+        }
         self.hand_out();
         let mut ended = None;
         self.apart |= self.held() > bytes / 2; // one that was alone would have room for more than half of what is left
@@ -188,16 +211,6 @@ impl Race {
             ended = self.by_two(bytes, watch)?;
         }
         if ended.is_none() {
-            ended = self.in_turn(bytes, watch)?;
-        }
-        if ended.is_none()
-            && let Some(others) = self.others.take()
-        {
-            let first = others.first();
-            let mut orders = others.all(&self.transitions, watch)?;
-            // One that has given way does not come again.
-            orders.retain(|order| !first.contains(order) || self.field.iter().any(|racer| racer.order == *order));
-            self.line_up(orders);
             ended = self.in_turn(bytes, watch)?;
         }
         if let Some((at, reach)) = ended
@@ -213,7 +226,7 @@ impl Race {
         self.spent += self.fuel;
         drop_twins(&mut self.field);
         self.rounds_settled += u32::from(self.settled);
-        if self.is_long() && !self.settled {
+        if self.spent >= PATIENCE * self.first && !self.settled {
             self.thinned += 1;
             self.settled = thin_out(&mut self.field, self.thinned);
         }
@@ -238,6 +251,7 @@ mod tests {
 
     use super::*;
     use crate::budget::unwatched;
+    use crate::samples::slotted_ring;
 
     /// Results that end no search.
     const SLOW: u64 = 400;
@@ -253,21 +267,18 @@ mod tests {
     }
 
     #[test]
-    fn a_race_is_long_when_some_drop_out_and_most_are_over_before() {
-        for (count, zones, ends) in [(2, 4, true), (8, 24, false)] {
-            let (places, transitions, initial) = vehicles(count, zones);
-            let mut poll = unwatched;
-            let watch = &mut Watch::new(None, &mut poll);
-            let mut race = Race::new(places, (transitions, initial), None, watch).expect("enough room");
-            let (mut all, mut found) = (race.field.len(), None);
-            while found.is_none() && !race.is_long() {
-                assert_eq!(race.thinned, 0);
-                found = race.round(1 << 30, watch).expect("enough room");
-                all = all.max(race.field.len());
-            }
-            assert_eq!(found.is_some(), ends);
-            assert_eq!((race.thinned, race.field.len() < all), (u32::from(!ends), true));
+    fn some_drop_out_once_all_had_some_rounds() {
+        let (places, transitions, initial) = vehicles(8, 24);
+        let mut poll = unwatched;
+        let watch = &mut Watch::new(None, &mut poll);
+        let mut race = Race::new(places, (transitions, initial), None, watch).expect("enough room");
+        let mut fields = Vec::new();
+        while race.thinned == 0 {
+            assert!(race.round(1 << 30, watch).expect("enough room").is_none(), "the race is over too soon");
+            fields.push(race.field.len());
         }
+        assert_eq!((fields.len(), fields[0], race.spent), (3, 2, PATIENCE * race.first));
+        assert!(fields[1] > fields[2] && fields[2] > 2, "{fields:?}");
     }
 
     #[test]
@@ -280,19 +291,22 @@ mod tests {
             let mut race = Race::new(places, net.clone(), None, watch).expect("enough room");
             (race.first, race.fuel) = (fuel, fuel);
             let first: Vec<Order> = race.field.iter().map(|racer| racer.order.clone()).collect();
-            assert_eq!(first.len(), 2);
             assert_eq!(race.round(1 << 30, watch).map(|found| found.is_some()), Ok(ends));
-            assert_eq!(race.others.is_some(), ends);
+            assert_eq!((race.field.len(), race.others.is_some()), (if ends { 0 } else { 2 }, true));
             if ends {
                 continue;
             }
-            assert!(race.field.len() > 2 && race.field.iter().all(|racer| racer.begun.is_some() && racer.fuel == 0));
-            assert!(race.field[0].is_shortest && race.field[1].is_shortest && !race.field[2].is_shortest);
+            assert!(race.round(1 << 30, watch).is_ok_and(|found| found.is_none()));
+            assert!(race.others.is_none() && race.field.len() > 4 && race.field.iter().all(|racer| racer.fuel == 0));
+            let marks: Vec<(bool, bool)> =
+                race.field.iter().map(|racer| (racer.is_by_units, racer.is_shortest)).collect();
+            assert_eq!(marks[..4], [(true, false), (true, false), (false, true), (false, true)]);
+            assert!(marks[4..].iter().all(|&each| each == (false, false)));
             for order in first {
-                // It had one turn, as long as if it had run alone.
+                // Its two rounds were as long as if it had run alone.
                 let mut alone = Race::new(places, net.clone(), Some(vec![order]), watch).expect("enough room");
                 (alone.first, alone.fuel) = (fuel, fuel);
-                assert!(alone.round(1 << 30, watch).is_ok_and(|found| found.is_none()));
+                assert!((0..2).all(|_| alone.round(1 << 30, watch).is_ok_and(|found| found.is_none())));
                 let here = race.field.iter().find(|racer| racer.order == alone.field[0].order);
                 assert_eq!(here.map(Racer::standing), Some(alone.field[0].standing()));
             }
@@ -300,15 +314,51 @@ mod tests {
     }
 
     #[test]
-    fn who_has_given_way_before_the_other_orders_are_made_does_not_come_again() {
-        let (places, transitions, initial) = vehicles(4, 16);
+    fn orders_by_units_have_as_much_as_all_others_together_to_the_end() {
+        let (places, transitions, initial) = vehicles(6, 24);
         let mut poll = unwatched;
         let watch = &mut Watch::new(None, &mut poll);
         let mut race = Race::new(places, (transitions, initial), None, watch).expect("enough room");
         (race.first, race.fuel) = (SLOW, SLOW);
-        let gone = race.field.remove(1).order;
-        assert!(race.round(1 << 30, watch).is_ok_and(|found| found.is_none()));
-        assert!(race.field.len() > 2 && race.field.iter().all(|racer| racer.order != gone));
+        for _ in 0..9 {
+            assert!(race.round(1 << 30, watch).expect("enough room").is_none(), "the race is over too soon");
+            race.hand_out();
+            let [own, others] = [true, false].map(|is_by_units| {
+                let of = race.field.iter().filter(|racer| racer.is_by_units == is_by_units);
+                of.map(|racer| racer.fuel).collect::<Vec<u64>>()
+            });
+            if race.others.is_none() {
+                assert!(own.len() == 2 && own.iter().all(|fuel| *fuel == others.iter().sum::<u64>() / 2), "{own:?}");
+            }
+            if race.settled {
+                assert_eq!(others[..2], [race.fuel, race.fuel / RUNNER_UP]);
+            }
+        }
+        assert!(race.settled && race.rounds_settled > ROUNDS_ALONE && race.field[..2].iter().all(|r| r.is_by_units));
+        // Alone they go on as all do.
+        race.field.truncate(2);
+        race.hand_out();
+        assert!(race.field.iter().all(|racer| racer.fuel == race.fuel / 2));
+    }
+
+    #[test]
+    fn who_has_given_way_before_the_other_orders_are_made_does_not_come_again() {
+        let net = slotted_ring(40);
+        let initial: Vec<u32> = (0..40).flat_map(|node| [8 * node + 2, 8 * node + 4]).collect();
+        for gives_way in [false, true] {
+            let mut poll = unwatched;
+            let watch = &mut Watch::new(None, &mut poll);
+            let all = (net.transitions.clone(), initial.clone());
+            let mut race = Race::new(net.places, all, None, watch).expect("enough room");
+            let gone = race.field[1].order.clone();
+            if gives_way {
+                race.field.remove(1);
+            }
+            let others = race.others.take().expect("not made yet");
+            assert_eq!(race.line_others_up(others, watch), Ok(()));
+            assert!(race.field.len() > 2);
+            assert_eq!(race.field.iter().filter(|racer| racer.order == gone).count(), usize::from(!gives_way));
+        }
     }
 
     /// A race that nothing ends in the first round of, gone on with by one thread or two, with so many results in the next.

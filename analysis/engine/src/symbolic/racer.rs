@@ -11,7 +11,9 @@ use crate::net::Transition;
 /// A search in one order, which may be left and gone on with.
 pub(super) struct Racer {
     pub(super) order: Order,
-    /// Whether no other order that was made has shorter arcs, but for its reverse.
+    /// Whether its order is by units (`units`), and it has a share of its own.
+    pub(super) is_by_units: bool,
+    /// Whether no other order of places that was made has shorter arcs, but for its reverse.
     pub(super) is_shortest: bool,
     /// Whether others run for the first places, and this one beside them.
     pub(super) spared: bool,
@@ -26,7 +28,16 @@ pub(super) struct Racer {
 
 impl Racer {
     pub(super) fn new(order: Order) -> Self {
-        Racer { order, is_shortest: false, spared: false, begun: None, before: 0, ran: false, fuel: 0 }
+        Racer {
+            order,
+            is_by_units: false,
+            is_shortest: false,
+            spared: false,
+            begun: None,
+            before: 0,
+            ran: false,
+            fuel: 0,
+        }
     }
 
     /// Whether its order is the one that the net came in, from either end.

@@ -6,7 +6,7 @@
 //! the net came in is spared for some rounds beside these, as what its author knew shows in no measure. The one with the
 //! shortest arcs, from either end, stays to the end: on a chain of parts every search seems to be nearly done all the
 //! time, and nothing else tells that it is the one that will be. The rejected alternative, to go by the levels done alone,
-//! drops most winners early.
+//! drops most winners early. Orders by units take no part in this: no measure shows that they win.
 //!
 //! The candidates come as an order and its reverse. Where the direction matters, it soon shows, and then it is everything;
 //! where it does not, the two are *twins*: the net looks the same from both ends, and one search says what the other
@@ -30,6 +30,7 @@ const TWINS_APART: u64 = 256;
 /// unless the other has come half as far again. Where memory has left only who is spared, these run for the first places.
 /// `thinned` counts the times; true where the last two are left, and who stays beside them.
 pub(super) fn thin_out(field: &mut Vec<Racer>, thinned: u32) -> bool {
+    let by_units: Vec<Racer> = field.extract_if(.., |racer| racer.is_by_units).collect();
     let mut spared: Vec<Racer> = field.extract_if(.., |racer| racer.spared).collect();
     if field.is_empty() {
         field.extend(spared.drain(..).map(|racer| Racer { spared: false, ..racer }));
@@ -62,12 +63,14 @@ pub(super) fn thin_out(field: &mut Vec<Racer>, thinned: u32) -> bool {
     }
     spared.retain(|racer| racer.is_shortest || thinned <= SPARED_ROUNDS);
     field.append(&mut spared);
-    running(field) <= FINALISTS && field.iter().all(|racer| !racer.spared || racer.is_shortest)
+    let are_last = running(field) <= FINALISTS && field.iter().all(|racer| !racer.spared || racer.is_shortest);
+    field.splice(0..0, by_units);
+    are_last
 }
 
 /// How many run for the first places.
 pub(super) fn running(field: &[Racer]) -> usize {
-    field.iter().filter(|racer| !racer.spared).count()
+    field.iter().filter(|racer| !racer.spared && !racer.is_by_units).count()
 }
 
 /// Whether two searches, which have both run, stand at the same level after about as many firings.
@@ -81,13 +84,14 @@ fn are_twins(one: &Racer, other: &Racer) -> bool {
 }
 
 /// Takes out of each two twins the one with more nodes, but none of the shortest order for another one, nor one that runs
-/// for the first places for one beside. Of two that wait, standing still says nothing.
+/// for the first places for one beside, nor one by units for one by places. Of two that wait, standing still says nothing.
 pub(super) fn drop_twins(field: &mut Vec<Racer>) {
     for at in (0..field.len()).rev() {
         let racer = &field[at];
         let nodes = racer.standing().1;
         let does = |(beside, other): (usize, &Racer)| {
             (other.standing().1, beside) < (nodes, at)
+                && other.is_by_units == racer.is_by_units
                 && (other.is_shortest || !racer.is_shortest)
                 && (racer.spared || !other.spared)
                 && are_twins(other, racer)
@@ -205,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn the_shortest_order_is_no_twin_of_another_one() {
+    fn the_shortest_order_is_no_twin_of_another_one_nor_one_by_units() {
         let [along, back, across, _] = orders();
         let turned: Order = (45..90).chain(0..45).collect();
         for (is_shortest, left) in [(false, 2), (true, 3)] {
@@ -216,6 +220,10 @@ mod tests {
             assert_eq!(racers.len(), left);
             assert_eq!(racers.iter().any(|racer| racer.order == along), is_shortest);
         }
+        let (mut racers, transitions) = field(&[along.clone(), turned.clone(), across.clone()]);
+        racers[1].is_by_units = true;
+        (0..4).for_each(|_| round(&mut racers, &transitions, |_| 200));
+        assert_eq!(racers.len(), 3);
         // Of both its directions one is enough.
         let (mut racers, transitions) = field(&[along, back, across]);
         racers[..2].iter_mut().for_each(|racer| racer.is_shortest = true);
