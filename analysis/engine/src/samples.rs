@@ -39,6 +39,25 @@ pub(crate) fn slotted_ring(n: u32) -> Net {
     Net::new(8 * n as usize, transitions, &initial).expect("well formed")
 }
 
+/// Machines of ten steps, each of which may be left for three others, and some together with one of two other machines:
+/// most arcs are within a machine. Step `s` of machine `m` is place `s * n + m`.
+pub(crate) fn wanderers(n: u32) -> Net {
+    let at = |machine: u32, step: u32| step % 10 * n + machine % n;
+    let moves = |machine: u32, step: u32| {
+        [3 * step + 1, 7 * step + 2, step + 5]
+            .map(|to| Transition::new(&[at(machine, step)], &[at(machine, to)], &[], &[], &[]))
+    };
+    let meets = |machine: u32| {
+        [5 * machine + 3, machine + 1].map(|other| {
+            let (inputs, outputs) = ([at(machine, 9), at(other, 4)], [at(machine, 0), at(other, 8)]);
+            Transition::new(&inputs, &outputs, &[], &[], &[])
+        })
+    };
+    let alone = (0..n).flat_map(|machine| (0..10).flat_map(move |step| moves(machine, step)));
+    let transitions = alone.chain((0..n).flat_map(meets)).collect();
+    Net::new((10 * n) as usize, transitions, &(0..n).collect::<Vec<u32>>()).expect("well formed")
+}
+
 pub(crate) fn explore(net: Net, step: bool) -> Space {
     let limits = Limits { step, markings: 1 << 20, memory_bytes: 1 << 28, time: None };
     Space::explore(net, limits, &mut unwatched).expect("fits")

@@ -35,12 +35,15 @@ impl Symbolic {
         if only {
             return race.run(bytes, watch);
         }
-        let short = match race.round(bytes, watch) {
-            Ok(Some(found)) => return Ok(found),
-            Ok(None) => false,
-            Err(Stop::Memory) => true,
-            Err(stop) => return Err(stop),
-        };
+        let mut short = false;
+        while !race.is_long() && !short {
+            match race.round(bytes, watch) {
+                Ok(Some(found)) => return Ok(found),
+                Ok(None) => {}
+                Err(Stop::Memory) => short = true,
+                Err(stop) => return Err(stop),
+            }
+        }
         // Most nets are done by now, sooner than a smaller one is looked for.
         let smaller = merged(places, &race.transitions, &race.initial, watch)?
             .filter(|small| 4 * small.stands.len() <= LEFT_OF_FOUR * places);
