@@ -2,7 +2,7 @@
 //!
 //! Two places are *concurrent* where both are marked in M0, or where a transition whose inputs and permissive gates are
 //! concurrent to each other marks one of them, and marks the other one, too, or leaves it marked, as it may leave what is
-//! concurrent to all that it needs. The least relation of that kind has all pairs that a reachable marking has; it is
+//! concurrent to all that it needs and none of its inhibitive gates. The least relation of that kind has all pairs that a reachable marking has; it is
 //! found in whole rows of bits, where the exact one would take the state space itself. That firings wait for contact is
 //! left out: it only keeps them away.
 //!
@@ -14,9 +14,9 @@ use std::collections::VecDeque;
 use crate::budget::{Stop, Watch};
 use crate::net::Transition;
 
-/// Nets with more places are left alone: the relation is a square.
-const PLACES_MAX: usize = 1 << 14;
-/// The words that are looked at, at most: some tenths of a second.
+/// Nets with more places are left alone: the relation is a square, then of 8 MiB.
+const PLACES_MAX: usize = 1 << 13;
+/// The words, pairs and transitions that are looked at, at most: some tenths of a second.
 const WORDS_MAX: usize = 1 << 28;
 
 /// A symmetric relation of places, a row of bits each.
@@ -55,19 +55,23 @@ impl Concurrency {
         let (mut behind, mut looked) = (vec![0; relation.words], 0);
         while let Some(t) = agenda.pop() {
             let transition = &transitions[t as usize];
-            if !relation.may_fire(transition) {
-                continue;
-            }
-            let cost = relation.words * (needed(transition).count() + transition.outputs.len() + 1);
+            let needs = needed(transition).count();
+            let cost = needs * needs + relation.words * (needs + transition.outputs.len() + 1);
             looked += cost;
             if looked > words_max {
                 return Ok(None);
             }
             watch.tick(cost)?;
+            if !relation.may_fire(transition) {
+                continue;
+            }
             relation.behind(transition, &mut behind);
             for &place in &transition.outputs {
-                relation.mark(place, &behind, &mut agenda);
+                let new = relation.mark(place, &behind, &mut agenda);
+                looked += new;
+                watch.tick(new)?;
             }
+            looked += agenda.wake_touched(watch)?;
         }
         Ok(Some(relation))
     }
@@ -127,12 +131,13 @@ impl Concurrency {
         transition.outputs.iter().for_each(|&place| put(behind, place, true));
     }
 
-    /// Takes a place as marked beside these others.
-    fn mark(&mut self, place: u32, others: &[u64], agenda: &mut Agenda) {
-        let mut is_new = !is_in(&self.marked, place);
-        if is_new {
+    /// Takes a place as marked beside these others; how many of them it was not known to be beside.
+    fn mark(&mut self, place: u32, others: &[u64], agenda: &mut Agenda) -> usize {
+        let mut found = 0;
+        if !is_in(&self.marked, place) {
             put(&mut self.marked, place, true);
-            agenda.wake_all_that_need_nothing();
+            agenda.touch(place);
+            agenda.touch_nothing();
         }
         for (at, others) in others.iter().enumerate() {
             let mut new = others & !self.row(place)[at];
@@ -141,14 +146,15 @@ impl Concurrency {
                 new &= new - 1;
                 if other != place {
                     self.relate(place, other);
-                    agenda.wake(other);
-                    is_new = true;
+                    agenda.touch(other);
+                    found += 1;
                 }
             }
         }
-        if is_new {
-            agenda.wake(place);
+        if found > 0 {
+            agenda.touch(place);
         }
+        found
     }
 }
 
@@ -158,6 +164,9 @@ struct Agenda {
     of: Vec<Vec<u32>>,
     waits: Vec<bool>,
     todo: VecDeque<u32>,
+    /// The places of which something was found, each once, and whether it is one of them.
+    touched: Vec<u32>,
+    is_touched: Vec<bool>,
 }
 
 impl Agenda {
@@ -169,7 +178,9 @@ impl Agenda {
                 of[places].push(t);
             }
         }
-        Agenda { of, waits: vec![true; transitions.len()], todo: (0..transitions.len() as u32).collect() }
+        let todo = (0..transitions.len() as u32).collect();
+        let is_touched = vec![false; of.len()];
+        Agenda { of, waits: vec![true; transitions.len()], todo, touched: Vec::new(), is_touched }
     }
 
     fn pop(&mut self) -> Option<u32> {
@@ -178,16 +189,33 @@ impl Agenda {
         Some(first)
     }
 
-    fn wake(&mut self, place: u32) {
-        for &t in &self.of[place as usize] {
-            if !std::mem::replace(&mut self.waits[t as usize], true) {
-                self.todo.push_back(t);
-            }
+    /// Something was found of a place.
+    fn touch(&mut self, place: u32) {
+        if !std::mem::replace(&mut self.is_touched[place as usize], true) {
+            self.touched.push(place);
         }
     }
 
-    fn wake_all_that_need_nothing(&mut self) {
-        self.wake(self.of.len() as u32 - 1);
+    /// The transitions that need nothing have something new beside them.
+    fn touch_nothing(&mut self) {
+        self.touch(self.of.len() as u32 - 1);
+    }
+
+    /// Has the transitions looked at again that need a place of which something was found; how many there are.
+    fn wake_touched(&mut self, watch: &mut Watch<'_>) -> Result<usize, Stop> {
+        let mut all = 0;
+        for place in self.touched.drain(..) {
+            self.is_touched[place as usize] = false;
+            let of = &self.of[place as usize];
+            watch.tick(of.len() + 1)?;
+            all += of.len() + 1;
+            for &t in of {
+                if !std::mem::replace(&mut self.waits[t as usize], true) {
+                    self.todo.push_back(t);
+                }
+            }
+        }
+        Ok(all)
     }
 }
 
@@ -290,8 +318,8 @@ mod tests {
         assert!(Concurrency::of(PLACES_MAX + 1, &[], &[], watch).is_ok_and(|found| found.is_none()));
         let mut poll = unwatched;
         let watch = &mut Watch::new(None, &mut poll);
-        // Each of 200 transitions is looked at, and takes rows of 4 words for what it needs, puts, and leaves.
-        for (words, is_found) in [(WORDS_MAX, true), (200 * 3 * 4 - 1, false)] {
+        // Each of 200 transitions is looked at: one pair, and rows of 4 words for what it needs, puts, and leaves.
+        for (words, is_found) in [(WORDS_MAX, true), (200 * (1 + 3 * 4) - 1, false)] {
             let found = Concurrency::within(words, 200, &net.transitions, &initial, watch);
             assert!(found.is_ok_and(|found| found.is_some() == is_found), "{words}");
         }

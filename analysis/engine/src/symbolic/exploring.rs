@@ -85,7 +85,7 @@ impl Symbolic {
             return Ok(None);
         }
         let Merged { transitions: its, initial: begin, stands } = smaller;
-        let mut small = Race::new(stands.len(), (its, begin), None, watch)?.run(bytes, watch)?;
+        let mut small = Race::new(stands.len(), (its, begin), None, watch)?.known_to_be_long().run(bytes, watch)?;
         let reach = small.reach;
         if small.all(&[], reach, Events::Contacts, watch)? != EMPTY {
             return Ok(None);

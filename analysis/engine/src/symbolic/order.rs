@@ -27,7 +27,6 @@
 use std::panic::resume_unwind;
 use std::thread;
 
-use super::units::by_unit;
 use crate::budget::{Stop, Watch};
 use crate::net::Transition;
 
@@ -38,9 +37,6 @@ const FORCE_WORK: usize = 40_000_000;
 /// How far a place may slide, and the arcs that all sliding may visit.
 const WINDOW: usize = 12;
 const SLIDING_WORK: usize = 10_000_000;
-
-/// The span of an order by units, to the shortest one, beyond which the two have different things to say.
-const OWN_SPAN: (u64, u64) = (8, 9);
 
 /// The work between two looks at the clock, or more.
 const BETWEEN: usize = 1 << 16;
@@ -287,19 +283,10 @@ impl Candidates {
         both(self.sloan.clone())
     }
 
-    /// Orders worth trying, each followed by its reverse: that by units, if there are any, and those of places, the ones
-    /// with the shorter arcs first.
-    ///
-    /// Where the arcs by units are hardly longer than the shortest, as where the units are small and alike, the order has
-    /// nothing to say that the others do not, and is left out.
+    /// Orders worth trying, those with the shorter arcs first, each followed by its reverse.
     ///
     /// The watch is asked between two of them, each of which has work of its own that is bounded.
-    pub(super) fn all(
-        self,
-        transitions: &[Transition],
-        initial: &[u32],
-        watch: &mut Watch<'_>,
-    ) -> Result<[Vec<Order>; 2], Stop> {
+    pub(super) fn all(self, transitions: &[Transition], watch: &mut Watch<'_>) -> Result<Vec<Order>, Stop> {
         let Candidates { graph, sloan } = self;
         let as_given: Order = (0..graph.places as u32).collect();
         let span = |pair: &[Order; 2]| graph.span(&pair[0]);
@@ -324,16 +311,13 @@ impl Candidates {
         }
         found.extend(given.into_iter().chain(spectral));
         found.sort_by_cached_key(span);
-        let shortest = found.iter().map(span).min().unwrap_or(0);
-        let by_units = by_unit(graph.places, transitions, initial, watch)?;
-        let own = by_units.into_iter().filter(|pair| OWN_SPAN.0 * span(pair) > OWN_SPAN.1 * shortest).collect();
         let mut distinct: Vec<[Order; 2]> = Vec::new();
         for pair in found {
-            if !distinct.iter().chain(&own).any(|other: &[Order; 2]| other.contains(&pair[0])) {
+            if !distinct.iter().any(|other| other.contains(&pair[0])) {
                 distinct.push(pair);
             }
         }
-        Ok([own, distinct].map(|pairs: Vec<[Order; 2]>| pairs.into_iter().flatten().collect()))
+        Ok(distinct.into_iter().flatten().collect())
     }
 }
 
@@ -346,7 +330,7 @@ pub(super) fn both(order: Order) -> [Order; 2] {
 mod tests {
     use super::*;
     use crate::budget::unwatched;
-    use crate::samples::{slotted_ring, wanderers};
+    use crate::samples::slotted_ring;
 
     #[test]
     fn places_at_one_position_stay_as_they_were() {
@@ -364,20 +348,7 @@ mod tests {
     fn made(places: usize, transitions: &[Transition]) -> Vec<Order> {
         let mut poll = unwatched;
         let watch = &mut Watch::new(None, &mut poll);
-        Candidates::new(places, transitions, watch).and_then(|made| made.all(transitions, &[], watch)).unwrap().concat()
-    }
-
-    #[test]
-    fn an_order_by_units_is_left_out_where_its_arcs_are_hardly_longer_than_the_shortest() {
-        let slots = (0..20).flat_map(|node| [8 * node + 2, 8 * node + 4]).collect::<Vec<u32>>();
-        for (net, initial, count) in [(slotted_ring(20), slots, 0), (wanderers(16), (0..16).collect(), 2)] {
-            let mut poll = unwatched;
-            let watch = &mut Watch::new(None, &mut poll);
-            let made = Candidates::new(net.places, &net.transitions, watch);
-            let [by_units, others] = made.and_then(|made| made.all(&net.transitions, &initial, watch)).unwrap();
-            assert_eq!((by_units.len(), others.len() > 4), (count, true));
-            assert!(others.iter().all(|order| !by_units.contains(order)));
-        }
+        Candidates::new(places, transitions, watch).and_then(|made| made.all(transitions, watch)).unwrap()
     }
 
     #[test]
@@ -397,8 +368,7 @@ mod tests {
                 if polls > last { Err(Stop::Cancelled) } else { Ok(()) }
             };
             let watch = &mut Watch::often(None, &mut poll);
-            let stopped =
-                Candidates::new(1000, &transitions, watch).and_then(|made| made.all(&transitions, &[], watch));
+            let stopped = Candidates::new(1000, &transitions, watch).and_then(|made| made.all(&transitions, watch));
             assert_eq!((stopped, polls), (Err(Stop::Cancelled), last + 1));
         }
     }
@@ -454,8 +424,7 @@ mod tests {
         let (n, transitions) = (1000, ring(1000));
         let graph = Graph::new(n, &transitions);
         let given: Order = (0..n as u32).collect();
-        let made = made(n, &transitions);
-        assert!(made.iter().map(|order| graph.span(order)).min() <= Some(2 * n as u64));
+        assert!(graph.span(&made(n, &transitions)[0]) <= 2 * n as u64);
         assert!(graph.span(&given) > 10 * n as u64);
     }
 }

@@ -96,7 +96,8 @@ pub(super) fn drop_twins(field: &mut Vec<Racer>) {
                 && (racer.spared || !other.spared)
                 && are_twins(other, racer)
         };
-        if field.len() > FINALISTS && field.iter().enumerate().any(does) {
+        let alike = field.iter().filter(|other| other.is_by_units == racer.is_by_units).count();
+        if (racer.is_by_units || alike > FINALISTS) && field.iter().enumerate().any(does) {
             field.remove(at);
         }
     }

@@ -4,14 +4,16 @@
 //! apart in one bundle of nodes, however many they are and in whatever order they stand there. So the arcs within a unit
 //! cost nothing, and the order that counts is that of the units. By the sum of the spans the arcs within outweigh those
 //! in between, as they are many more; and what is between a few dozen units can be laid out far better than hundreds
-//! of places can. Of the nets of the model-checking contest that take seconds most are found ten times sooner so.
+//! of places can. Of the nets of the model-checking contest that take seconds most are found several times sooner so.
 //!
 //! The units are made of the net itself, by which places are concurrent (`concurrency`): of two that are joined by arcs
 //! those come together first that are joined by most, as long as no two of their places may be marked together. Their
 //! order is the best of some, of which each is made by FORCE and then by *sifting*: unit by unit goes to wherever the
-//! spans are least. From one start alone both end in the next best order, which may be a bad one.
+//! spans are least. (Rudell's sifting moves levels of the diagram itself; here nothing is moved but in the sum.) From one
+//! start alone both end in an order that no single move betters, which may be a bad one.
 //!
-//! Rejected: units as a file names them (NUPN). Few files do, and those of generated nets are pieces of the program that
+//! The name is that of nested-unit Petri nets (Garavel 2019), of which the safe ones have units as these are. Rejected:
+//! units as a file names them. Few files do, and those of generated nets are pieces of the program that
 //! they were made of, of which several can be one.
 
 use std::cmp::Reverse;
@@ -25,27 +27,37 @@ use crate::random::Random;
 
 /// How many of four places are left as units at most: more have nothing to say that the places do not.
 const LEFT_OF_FOUR: usize = 3;
-/// The orders that the best is taken of, but for those that FORCE begins with elsewhere.
+/// The orders that FORCE begins with, drawn at random, beside that of Sloan and the given one.
 const DRAWN: u64 = 6;
-/// What sifting may look at, from all starts together.
-const SIFTING_WORK: usize = 20_000_000;
+/// What laying out may look at, from all starts together, and FORCE for each arc of one start.
+const WORK_MAX: usize = 20_000_000;
+const FORCE: usize = 40;
 
 /// Joins of units are weighed in parts of one arc to one arc.
 const WEIGHT: u64 = 1 << 20;
+/// How many joins may be made, and moved when units come together, before it takes too long.
+const JOINS_MAX: usize = 1 << 19;
 
-/// The places in units, each in the order of the net; None where there are hardly fewer units than places.
+/// The places in units, each in the order of the net; None where there are hardly fewer units than places, or where it
+/// would take more than so many joins.
 fn units(
     places: usize,
     transitions: &[Transition],
     initial: &[u32],
+    joins_max: usize,
     watch: &mut Watch<'_>,
 ) -> Result<Option<Vec<Vec<u32>>>, Stop> {
+    let mut joins: usize = transitions.iter().map(|each| each.inputs.len() * each.outputs.len()).sum();
+    if joins > joins_max {
+        return Ok(None);
+    }
     let Some(mut concurrent) = Concurrency::of(places, transitions, initial, watch)? else { return Ok(None) };
     let mut beside: Vec<BTreeMap<u32, u64>> = vec![BTreeMap::new(); places];
     for transition in transitions {
         let weight = WEIGHT / (transition.inputs.len() * transition.outputs.len()).max(1) as u64;
         for &from in &transition.inputs {
-            for &to in transition.outputs.iter().filter(|&&to| to != from) {
+            watch.tick(transition.outputs.len())?;
+            for &to in transition.outputs.iter().filter(|&&to| to != from && !concurrent.has(from, to)) {
                 *beside[from as usize].entry(to).or_default() += weight;
                 *beside[to as usize].entry(from).or_default() += weight;
             }
@@ -58,14 +70,19 @@ fn units(
     }
     let mut members: Vec<Vec<u32>> = (0..places as u32).map(|place| vec![place]).collect();
     while let Some((weight, Reverse(one), Reverse(other))) = heap.pop() {
-        watch.tick(members[other as usize].len() + 1)?;
+        watch.tick(1)?;
         if beside[one as usize].get(&other) != Some(&weight) {
             continue; // as it was before one of them has grown
         }
         beside[one as usize].remove(&other);
         beside[other as usize].remove(&one);
+        watch.tick(members[other as usize].len() + beside[other as usize].len())?;
         if members[other as usize].iter().any(|&place| concurrent.has(one, place)) {
             continue;
+        }
+        joins += beside[other as usize].len();
+        if joins > joins_max {
+            return Ok(None);
         }
         concurrent.join(one, other);
         let gained = std::mem::take(&mut members[other as usize]);
@@ -92,7 +109,7 @@ pub(super) fn by_unit(
     initial: &[u32],
     watch: &mut Watch<'_>,
 ) -> Result<Option<[Order; 2]>, Stop> {
-    let Some(units) = units(places, transitions, initial, watch)? else { return Ok(None) };
+    let Some(units) = units(places, transitions, initial, JOINS_MAX, watch)? else { return Ok(None) };
     let mut unit_of = vec![0; places];
     for (unit, members) in units.iter().enumerate() {
         members.iter().for_each(|&place| unit_of[place as usize] = unit as u32);
@@ -116,6 +133,8 @@ pub(super) fn by_unit(
 
 /// The best order of vertices found, by the sum of the spans of what joins them.
 fn laid_out(vertices: usize, joins: &[Transition], watch: &mut Watch<'_>) -> Result<Order, Stop> {
+    let arcs: usize = joins.iter().map(|join| join.inputs.len()).sum();
+    watch.tick(arcs)?;
     let graph = Graph::new(vertices, joins);
     let spans = Spans::new(joins);
     let given: Order = (0..vertices as u32).collect();
@@ -125,8 +144,11 @@ fn laid_out(vertices: usize, joins: &[Transition], watch: &mut Watch<'_>) -> Res
         (1..vertices).for_each(|at| order.swap(at, random.below(at + 1)));
         order
     });
-    let mut left = SIFTING_WORK;
+    let mut left = WORK_MAX;
     for start in [graph.sloan(), given.clone()].into_iter().chain(drawn) {
+        let work = FORCE * (vertices + arcs);
+        watch.tick(work)?;
+        left = left.saturating_sub(work);
         let order = spans.sifted(graph.force(start), &mut left, watch)?;
         let span = graph.span(&order);
         if span < best.0 {
@@ -174,9 +196,9 @@ impl Spans {
         let Some(before) = order.iter().position(|&each| each == vertex) else { return false };
         order.remove(before);
         order.iter().enumerate().for_each(|(at, &each)| position[each as usize] = at);
-        // What each gap adds to the spans of the joins that go over it, as differences, and of those of the vertex.
-        let mut added = vec![0_i64; order.len() + 2];
-        let mut own = vec![0_i64; order.len() + 1];
+        // What a gap adds to the joins that go over it, by differences, and the spans of its own, by differences of those.
+        let (mut over, mut bends) = (vec![0_i64; order.len() + 2], vec![0_i64; order.len() + 2]);
+        let mut cost = 0;
         for (ends, count) in &self.joins {
             let others = ends.iter().filter(|&&end| end != vertex).map(|&end| position[end as usize]);
             let (low, high) = others.fold((usize::MAX, 0), |(low, high), at| (low.min(at), high.max(at)));
@@ -184,29 +206,25 @@ impl Spans {
             if low == usize::MAX {
                 continue;
             }
-            if ends.len() > 1 && ends.contains(&vertex) {
-                own.iter_mut().enumerate().for_each(|(gap, sum)| {
-                    let span = if gap <= low {
-                        high + 1 - gap
-                    } else if gap > high {
-                        gap - low
-                    } else {
-                        high - low + 1
-                    };
-                    *sum += count * span as i64;
-                });
+            if ends.contains(&vertex) {
+                // It grows to either side of the others, and is the same among them.
+                cost += count * (high as i64 + 1);
+                bends[0] -= count;
+                bends[low] += count;
+                bends[high + 1] += count;
             } else {
-                added[low + 1] += count;
-                added[high + 1] -= count;
+                over[low + 1] += count;
+                over[high + 1] -= count;
             }
         }
-        let mut over = 0;
-        let costs: Vec<i64> = own
-            .iter()
-            .enumerate()
-            .map(|(gap, own)| {
-                over += added[gap];
-                own + over
+        let mut slope = 0;
+        let costs: Vec<i64> = (0..=order.len())
+            .map(|gap| {
+                cost += over[gap];
+                let here = cost;
+                slope += bends[gap];
+                cost += slope;
+                here
             })
             .collect();
         let best = (0..costs.len()).min_by_key(|&gap| (costs[gap], gap.abs_diff(before))).unwrap_or(before);
@@ -219,7 +237,7 @@ impl Spans {
 mod tests {
     use super::*;
     use crate::budget::unwatched;
-    use crate::samples::machines;
+    use crate::samples::wanderers;
 
     fn watched<T>(work: impl FnOnce(&mut Watch<'_>) -> Result<T, Stop>) -> T {
         let mut poll = unwatched;
@@ -245,7 +263,7 @@ mod tests {
     #[test]
     fn the_steps_of_a_robot_are_a_unit_and_robots_that_hand_over_stand_side_by_side() {
         let (places, transitions, initial) = row(12, 5);
-        let found = watched(|watch| units(places, &transitions, &initial, watch)).expect("few units");
+        let found = watched(|watch| units(places, &transitions, &initial, JOINS_MAX, watch)).expect("few units");
         let steps = |robot: u32| (0..5).map(|step| step * 12 + robot).collect::<Vec<u32>>();
         assert_eq!(found, (0..12).map(steps).collect::<Vec<_>>());
         let [order, back] = watched(|watch| by_unit(places, &transitions, &initial, watch)).expect("few units");
@@ -262,7 +280,7 @@ mod tests {
             |count, inputs: &[u32], outputs: &[u32]| vec![Transition::new(inputs, outputs, &[], &[], &[]); count];
         let transitions =
             [some(5, &[0], &[1]), some(4, &[0, 3], &[2]), some(4, &[1, 3], &[2]), some(1, &[2], &[0])].concat();
-        let found = watched(|watch| units(4, &transitions, &[0, 3], watch));
+        let found = watched(|watch| units(4, &transitions, &[0, 3], JOINS_MAX, watch));
         assert_eq!(found, Some(vec![vec![0, 1, 2], vec![3]]));
     }
 
@@ -271,12 +289,23 @@ mod tests {
         let forks: Vec<Transition> =
             (0..8).map(|at| Transition::new(&[3 * at], &[3 * at + 1, 3 * at + 2], &[], &[], &[])).collect();
         let initial: Vec<u32> = (0..8).map(|at| 3 * at).collect();
-        let found = watched(|watch| units(24, &forks, &initial, watch)).expect("two for three");
+        let found = watched(|watch| units(24, &forks, &initial, JOINS_MAX, watch)).expect("two for three");
         assert!(found.iter().all(|unit| unit.len() < 3) && found.len() == 16, "{found:?}");
         let apart: Vec<Transition> = (0..8).map(|at| Transition::new(&[at], &[], &[], &[], &[])).collect();
         let initial: Vec<u32> = (0..8).collect();
-        assert_eq!(watched(|watch| units(8, &apart, &initial, watch)), None);
+        assert_eq!(watched(|watch| units(8, &apart, &initial, JOINS_MAX, watch)), None);
         assert_eq!(watched(|watch| by_unit(8, &apart, &initial, watch)), None);
+    }
+
+    #[test]
+    fn units_that_would_take_too_long_are_not_made() {
+        let (places, transitions, initial) = row(12, 5);
+        let mut least = 0; // a join for each arc to another one, and more where units with joins come together
+        while watched(|watch| units(places, &transitions, &initial, least, watch)).is_none() {
+            least += 1;
+        }
+        let arcs: usize = transitions.iter().map(|each| each.inputs.len() * each.outputs.len()).sum();
+        assert!(arcs < least && least < 3 * arcs, "{least} for {arcs}");
     }
 
     /// The sum of the spans, as anybody would count it.
@@ -309,7 +338,7 @@ mod tests {
                 assert_eq!(spans.sift(vertex, &mut order, &mut position), best < before);
                 assert_eq!(sum(&joins, &order), best);
             }
-            let mut left = SIFTING_WORK;
+            let mut left = WORK_MAX;
             let order = watched(|watch| spans.sifted(order, &mut left, watch));
             assert!((0..12).all(|vertex| least(vertex, &order) == sum(&joins, &order)) && 0 < left);
             let (mut left, start) = (1, vec![11, 0, 10, 1, 9, 2, 8, 3, 7, 4, 6, 5]);
@@ -319,22 +348,24 @@ mod tests {
 
     #[test]
     fn the_watch_ends_the_making_of_units_and_of_their_order() {
-        let net = machines(40, 0);
-        let initial: Vec<u32> = (0..80).step_by(2).collect();
-        let mut all = 0;
-        let mut poll = |_| {
-            all += 1;
-            Ok(())
-        };
-        assert!(by_unit(80, &net.transitions, &initial, &mut Watch::often(None, &mut poll)).is_ok());
-        for last in 0..all {
+        let net = wanderers(40);
+        let initial: Vec<u32> = (0..40).collect();
+        let polls_of = |last: usize, work: &dyn Fn(&mut Watch<'_>) -> Result<(), Stop>| {
             let mut polls = 0;
             let mut poll = |_| {
                 polls += 1;
                 if polls > last { Err(Stop::Cancelled) } else { Ok(()) }
             };
-            let stopped = by_unit(80, &net.transitions, &initial, &mut Watch::often(None, &mut poll));
-            assert_eq!((stopped, polls), (Err(Stop::Cancelled), last + 1));
+            let ended = work(&mut Watch::often(None, &mut poll));
+            (ended, polls)
+        };
+        let make = |watch: &mut Watch<'_>| units(400, &net.transitions, &initial, JOINS_MAX, watch).map(|_| ());
+        let order = |watch: &mut Watch<'_>| by_unit(400, &net.transitions, &initial, watch).map(|_| ());
+        let [of_units, of_all] =
+            [&make as &dyn Fn(&mut Watch<'_>) -> Result<(), Stop>, &order].map(|work| polls_of(usize::MAX, work).1);
+        assert!(0 < of_units && of_units < of_all, "{of_units} of {of_all}");
+        for last in 0..of_all {
+            assert_eq!(polls_of(last, &order), (Err(Stop::Cancelled), last + 1));
         }
     }
 }
