@@ -325,10 +325,12 @@ mod tests {
             let mut poll = unwatched;
             let watch = &mut Watch::new(None, &mut poll);
             let has_units = by_unit(net.places, &net.transitions, &initial, watch).expect("no budget").is_some();
-            let race = Race::new(net.places, (net.transitions, initial), None, watch).expect("enough room");
-            let mut race = if is_known { race.known_to_be_long() } else { race };
-            (race.first, race.fuel) = (TINY, TINY);
-            race.units_at = race.units_at.min(if is_known { TINY } else { PATIENCE * TINY });
+            let mut race = Race::new(net.places, (net.transitions, initial), None, watch).expect("enough room");
+            assert_eq!(race.units_at, PATIENCE * race.first);
+            (race.first, race.fuel, race.units_at) = (TINY, TINY, PATIENCE * TINY);
+            if is_known {
+                race = race.known_to_be_long();
+            }
             let (mut before, mut joined) = (0, None);
             while race.spent < 40 * TINY && joined.is_none() {
                 before = race.spent;
@@ -336,7 +338,11 @@ mod tests {
                 joined = race.field[0].is_by_units.then_some(before / TINY);
             }
             assert_eq!((has_units, joined), (true, joins_at), "{before}");
-            assert_eq!(race.field.iter().any(|racer| racer.is_by_units), joins_at.is_some());
+            let by_units = |race: &Race| race.field.iter().filter(|racer| racer.is_by_units).count();
+            let count = by_units(&race);
+            assert_eq!(count > 0, joins_at.is_some());
+            assert!(race.round(1 << 30, watch).is_ok_and(|found| found.is_none()), "the race is over too soon");
+            assert!(by_units(&race) <= count, "they join in once");
         }
         let (places, transitions, initial) = vehicles(2, 4);
         let (given, mut poll) = ((0..places as u32).collect(), unwatched);
@@ -367,10 +373,16 @@ mod tests {
                 assert_eq!(others[..2], [race.fuel, race.fuel / RUNNER_UP]);
             }
         }
+        // Where memory is short and nobody only stays beside the others, one of those that run gives way, or of these.
+        race.field.retain(|racer| !racer.spared);
+        let count = race.field.len();
+        race.give_way(count - 1);
+        assert_eq!(race.field.len(), count - 1);
         // Alone they share what one would have.
-        race.field.truncate(2);
+        race.field.retain(|racer| racer.is_by_units);
         race.hand_out();
-        assert!(race.field.iter().all(|racer| racer.fuel == race.fuel / 2));
+        let share = race.fuel / race.field.len() as u64;
+        assert!(!race.field.is_empty() && race.field.iter().all(|racer| racer.fuel == share));
     }
 
     #[test]

@@ -225,6 +225,13 @@ mod tests {
         racers[1].is_by_units = true;
         (0..4).for_each(|_| round(&mut racers, &transitions, |_| 200));
         assert_eq!(racers.len(), 3);
+        // Of two by units that are twins one is enough, and of two by places, where they are the last, both stay.
+        for (by_units, left) in [([true, true, false], 2), ([false, false, true], 3)] {
+            let (mut racers, transitions) = field(&[along.clone(), turned.clone(), across.clone()]);
+            racers.iter_mut().zip(by_units).for_each(|(racer, is_by_units)| racer.is_by_units = is_by_units);
+            (0..4).for_each(|_| round(&mut racers, &transitions, |_| 200));
+            assert_eq!(racers.len(), left, "{by_units:?}");
+        }
         // Of both its directions one is enough.
         let (mut racers, transitions) = field(&[along, back, across]);
         racers[..2].iter_mut().for_each(|racer| racer.is_shortest = true);
