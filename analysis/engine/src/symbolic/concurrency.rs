@@ -295,6 +295,12 @@ mod tests {
     }
 
     #[test]
+    fn a_token_that_is_alone_goes_on_too() {
+        let transitions = [Transition::new(&[1], &[2, 3], &[], &[], &[]), Transition::new(&[0], &[1], &[], &[], &[])];
+        assert_eq!(pairs(&relation(4, &transitions, &[0])), [(2, 3)]);
+    }
+
+    #[test]
     fn a_gate_keeps_what_it_waits_for_apart() {
         // The token on 0 goes to 1 where 2 is marked, or where it is not; another one goes from 2 to 3 and stays.
         let away = Transition::new(&[2], &[3], &[], &[], &[]);
