@@ -40,7 +40,7 @@ const PATIENCE: u64 = 7;
 const RUNNER_UP: u64 = 4;
 const BESIDE: u64 = 8;
 const ROUNDS_ALONE: u32 = 3;
-/// The span of an order by units, to the shortest one, beyond which the two have different things to say.
+/// The span of an order by units and the shortest one, the larger to the smaller, beyond which they say different things.
 const OWN_SPAN: (u64, u64) = (8, 9);
 
 /// The searches for the markings of one net, each in an order of its own.
@@ -121,16 +121,18 @@ impl Race {
         self
     }
 
-    /// Lets an order by units and its reverse join in, where there are any, and their arcs are longer than the shortest.
+    /// Lets an order by units and its reverse join in, where there are any.
     ///
-    /// Where they are not, as where the units are small and alike, the orders there are say what they would.
+    /// Not where their arcs are about as long as the shortest, as where the units are small and alike: the orders that
+    /// there are say what they would.
     fn line_units_up(&mut self, watch: &mut Watch<'_>) -> Result<(), Stop> {
         self.units_at = u64::MAX;
         let places = self.field.first().map_or(0, |racer| racer.order.len());
         let graph = Graph::new(places, &self.transitions);
         let Some(pair) = by_unit(places, &self.transitions, &self.initial, watch)? else { return Ok(()) };
         let shortest = self.field.iter().map(|racer| graph.span(&racer.order)).min().unwrap_or(0);
-        if OWN_SPAN.0 * graph.span(&pair[0]) > OWN_SPAN.1 * shortest {
+        let own = graph.span(&pair[0]);
+        if OWN_SPAN.0 * own.max(shortest) > OWN_SPAN.1 * own.min(shortest) {
             self.field.splice(0..0, pair.map(|order| Racer { is_by_units: true, ..Racer::new(order) }));
         }
         Ok(())
@@ -344,6 +346,14 @@ mod tests {
             assert!(race.round(1 << 30, watch).is_ok_and(|found| found.is_none()), "the race is over too soon");
             assert!(by_units(&race) <= count, "they join in once");
         }
+        // So they do where their arcs are shorter than those of all that were made.
+        let net = slotted_ring(40);
+        let initial: Vec<u32> = (0..40).flat_map(|node| [8 * node + 2, 8 * node + 4]).collect();
+        let mut poll = unwatched;
+        let watch = &mut Watch::new(None, &mut poll);
+        let mut race = Race::new(net.places, (net.transitions, initial), None, watch).expect("enough room");
+        race.field = vec![Racer::new((0..320).map(|at| at * 77 % 320).collect())];
+        assert_eq!((race.line_units_up(watch), race.field.len()), (Ok(()), 3));
         let (places, transitions, initial) = vehicles(2, 4);
         let (given, mut poll) = ((0..places as u32).collect(), unwatched);
         let race = Race::new(places, (transitions, initial), Some(vec![given]), &mut Watch::new(None, &mut poll));
