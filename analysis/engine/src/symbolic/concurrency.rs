@@ -2,9 +2,9 @@
 //!
 //! Two places are *concurrent* where both are marked in M0, or where a transition whose inputs and permissive gates are
 //! concurrent to each other marks one of them, and marks the other one, too, or leaves it marked, as it may leave what is
-//! concurrent to all that it needs and none of its inhibitive gates. The least relation of that kind has all pairs that a reachable marking has; it is
-//! found in whole rows of bits, where the exact one would take the state space itself. That firings wait for contact is
-//! left out: it only keeps them away.
+//! concurrent to all that it needs and none of its inhibitive gates. The least relation of that kind has all pairs that a
+//! reachable marking has; it is found in whole rows of bits, where the exact one would take the state space itself. That
+//! firings wait for contact is left out: it only keeps them away.
 //!
 //! Source: the structural concurrency relation (Kovalyov 1992, "Concurrency relations and the safety problem for Petri
 //! nets"), with gates, and by a worklist.
@@ -12,6 +12,7 @@
 use std::collections::VecDeque;
 
 use crate::budget::{Stop, Watch};
+use crate::marking::{holds, put, words_for};
 use crate::net::Transition;
 
 /// Nets with more places are left alone: the relation is a square, then of 8 MiB.
@@ -78,21 +79,21 @@ impl Concurrency {
 
     /// The places of M0.
     fn at_first(places: usize, initial: &[u32]) -> Self {
-        let words = places.div_ceil(64);
+        let words = words_for(places);
         let mut marked = vec![0; words];
-        initial.iter().for_each(|&place| put(&mut marked, place, true));
+        initial.iter().for_each(|&place| put(&mut marked, place));
         let mut rows = vec![0; places * words];
         for &place in initial {
             let row = &mut rows[place as usize * words..][..words];
             row.copy_from_slice(&marked);
-            put(row, place, false);
+            clear(row, place);
         }
         Concurrency { words, rows, marked }
     }
 
     /// Whether two places may be marked together; a place is not concurrent to itself.
     pub(super) fn has(&self, one: u32, other: u32) -> bool {
-        is_in(self.row(one), other)
+        holds(self.row(one), other)
     }
 
     /// Gives a place the row of another one besides its own.
@@ -108,14 +109,14 @@ impl Concurrency {
 
     fn relate(&mut self, one: u32, other: u32) {
         for (place, beside) in [(one, other), (other, one)] {
-            put(&mut self.rows[place as usize * self.words..][..self.words], beside, true);
+            put(&mut self.rows[place as usize * self.words..][..self.words], beside);
         }
     }
 
     /// Whether all that a transition needs may be marked, and together.
     fn may_fire(&self, transition: &Transition) -> bool {
         needed(transition).enumerate().all(|(at, place)| {
-            is_in(&self.marked, place)
+            holds(&self.marked, place)
                 && needed(transition).take(at).all(|other| other == place || self.has(place, other))
         })
     }
@@ -126,16 +127,16 @@ impl Concurrency {
         for place in needed(transition) {
             behind.iter_mut().zip(self.row(place)).for_each(|(all, own)| *all &= own);
         }
-        transition.permissive.iter().for_each(|&place| put(behind, place, true));
-        transition.inhibitive.iter().chain(&transition.inputs).for_each(|&place| put(behind, place, false));
-        transition.outputs.iter().for_each(|&place| put(behind, place, true));
+        transition.permissive.iter().for_each(|&place| put(behind, place));
+        transition.inhibitive.iter().chain(&transition.inputs).for_each(|&place| clear(behind, place));
+        transition.outputs.iter().for_each(|&place| put(behind, place));
     }
 
     /// Takes a place as marked beside these others; how many of them it was not known to be beside.
     fn mark(&mut self, place: u32, others: &[u64], agenda: &mut Agenda) -> usize {
         let mut found = 0;
-        if !is_in(&self.marked, place) {
-            put(&mut self.marked, place, true);
+        if !holds(&self.marked, place) {
+            put(&mut self.marked, place);
             agenda.touch(place);
             agenda.touch_nothing();
         }
@@ -219,14 +220,8 @@ impl Agenda {
     }
 }
 
-fn is_in(row: &[u64], place: u32) -> bool {
-    row[place as usize / 64] >> (place % 64) & 1 == 1
-}
-
-fn put(row: &mut [u64], place: u32, is_in: bool) {
-    let bit = 1 << (place % 64);
-    let word = &mut row[place as usize / 64];
-    *word = if is_in { *word | bit } else { *word & !bit };
+fn clear(row: &mut [u64], place: u32) {
+    row[place as usize / 64] &= !(1 << (place % 64));
 }
 
 /// The places that have to be marked for a transition to fire.
@@ -258,9 +253,7 @@ mod tests {
         for net in random_nets(400) {
             let (places, transitions) = (net.places, net.transitions.clone());
             let space = explore(net, false);
-            let full = |marking: &[u64]| {
-                (0..places as u32).filter(|&p| marking[p as usize / 64] >> (p % 64) & 1 == 1).collect::<Vec<u32>>()
-            };
+            let full = |marking: &[u64]| (0..places as u32).filter(|&p| holds(marking, p)).collect::<Vec<u32>>();
             let initial = full(space.marking(0));
             let relation = relation(places, &transitions, &initial);
             let mut together = std::collections::BTreeSet::new();

@@ -30,7 +30,7 @@ use std::thread;
 use crate::budget::{Stop, Watch};
 use crate::net::Transition;
 
-const FORCE_ROUNDS: usize = 40;
+pub(super) const FORCE_ROUNDS: usize = 40;
 /// The arcs that all rounds of FORCE together may visit.
 const FORCE_WORK: usize = 40_000_000;
 

@@ -117,7 +117,7 @@ impl Race {
 
     /// The same, with orders by units from the second round on, as it is known that the race is long.
     pub(super) fn known_to_be_long(mut self) -> Self {
-        self.units_at = self.units_at.min(self.first);
+        self.units_at = self.first;
         self
     }
 
@@ -280,6 +280,7 @@ mod tests {
 
     use super::*;
     use crate::budget::unwatched;
+    use crate::marking::holds;
     use crate::samples::{slotted_ring, wanderers};
 
     /// Results that end no search, and none that is nearly over.
@@ -322,8 +323,7 @@ mod tests {
             (slotted_ring(40), false, None),
             (slotted_ring(40), true, None),
         ] {
-            let marked = |place: &u32| net.initial[*place as usize / 64] >> (place % 64) & 1 == 1;
-            let initial: Vec<u32> = (0..net.places as u32).filter(marked).collect();
+            let initial: Vec<u32> = (0..net.places as u32).filter(|&place| holds(&net.initial, place)).collect();
             let mut poll = unwatched;
             let watch = &mut Watch::new(None, &mut poll);
             let has_units = by_unit(net.places, &net.transitions, &initial, watch).expect("no budget").is_some();
@@ -383,7 +383,7 @@ mod tests {
                 assert_eq!(others[..2], [race.fuel, race.fuel / RUNNER_UP]);
             }
         }
-        // Where memory is short and nobody only stays beside the others, one of those that run gives way, or of these.
+        // Where memory is short and nobody only stays beside the others, the largest of all gives way.
         race.field.retain(|racer| !racer.spared);
         let count = race.field.len();
         race.give_way(count - 1);

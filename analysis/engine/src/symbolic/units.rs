@@ -13,14 +13,14 @@
 //! start alone both end in an order that no single move betters, which may be a bad one.
 //!
 //! The name is that of nested-unit Petri nets (Garavel 2019), of which the safe ones have units as these are. Rejected:
-//! units as a file names them. Few files do, and those of generated nets are pieces of the program that
-//! they were made of, of which several can be one.
+//! units as a file names them. They are pieces of the program that a net was made of, of which several can be one, and
+//! hardly anybody who draws a net names any.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
 use super::concurrency::Concurrency;
-use super::order::{Graph, Order, both, joined};
+use super::order::{FORCE_ROUNDS, Graph, Order, both, joined};
 use crate::budget::{Stop, Watch};
 use crate::net::Transition;
 use crate::random::Random;
@@ -29,9 +29,8 @@ use crate::random::Random;
 const LEFT_OF_FOUR: usize = 3;
 /// The orders that FORCE begins with, drawn at random, beside that of Sloan and the given one.
 const DRAWN: u64 = 6;
-/// What laying out may look at, from all starts together, and FORCE for each arc of one start.
+/// What laying out may look at, from all starts together.
 const WORK_MAX: usize = 20_000_000;
-const FORCE: usize = 40;
 
 /// Joins of units are weighed in parts of one arc to one arc.
 const WEIGHT: u64 = 1 << 20;
@@ -146,7 +145,7 @@ fn laid_out(vertices: usize, joins: &[Transition], watch: &mut Watch<'_>) -> Res
     });
     let mut left = WORK_MAX;
     for start in [graph.sloan(), given.clone()].into_iter().chain(drawn) {
-        let work = FORCE * (vertices + arcs);
+        let work = FORCE_ROUNDS * (vertices + arcs);
         watch.tick(work)?;
         left = left.saturating_sub(work);
         let order = spans.sifted(graph.force(start), &mut left, watch)?;
