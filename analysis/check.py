@@ -21,7 +21,7 @@ The report's `course` tells what was tried. A technique that is asked for by nam
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -55,12 +55,15 @@ from firable.analysis.verdicts.behaviour import DEADLOCK_FREE, QUESTIONS
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.net import Net, TemporalProperty
 from firable.nets.queries import Query
-from firable.nets.temporal import Logic
 from firable.nets.verdict import Cost, Status, Verdict, spelled
 from firable.semantics.trace import Discipline
 
 FIRST_MARKINGS: Final = 200_000
 """How many markings `auto` explores before it lets techniques race."""
+FEW_MARKINGS: Final = 10_000
+"""Up to so many markings, formulas of LTL are asked of sets of them, which takes no time."""
+FOLLOWED_VERTICES: Final = 2**18
+"""How far runs are followed for such a formula where more are explored: mostly that decides it, in milliseconds."""
 ALONE_SECONDS: Final = 60.0
 """How long a technique that is named has for each question, where no time is given."""
 ALONE_STEPS: Final = 50
@@ -82,10 +85,14 @@ _SEEN_SHARE: Final = 0.25  # of the time that is left, for what the markings say
 _COUNTING_SHARE: Final = 0.5  # of the time that is left, for all markings without a graph
 _COUNTING_SECONDS_MAX: Final = 120.0
 _LEARNT_FIRST: Final = frozenset(question.name for question in QUESTIONS)
-_FIRST_LANES: Final = ((Method.REDUCTION, Method.WALK, Method.STATE_EQUATION), (Method.PARIKH,))
+_FIRST_LANES: Final = (
+    (Method.REDUCTION, Method.WALK, Method.STATE_EQUATION),
+    (Method.PARIKH,),
+    *FORMULA_LANES,
+)
 _FIRST_SLICES_SECONDS: Final = (3.0, 10.0)
 _FORMULAS_SHARE: Final = 0.25  # of the time that is left, for formulas without sets of markings
-_FORMULA_SLICES_SECONDS: Final = (1.0, 5.0)
+_FORMULA_SECONDS_MAX: Final = 1.0  # for each of them
 
 _Contestant: TypeAlias = Contestant[StateSpace[Any]]
 
@@ -172,18 +179,19 @@ class _Check:
             first = self._explore(replace(self.budget, markings=min(FIRST_MARKINGS, self.budget.markings)))
         except InputError as error:
             return self._without_a_graph(error)
-        if first.complete or first.engine.reason == "interrupted":
-            return self._explored(first)
-        course = [f"the first {first.n_markings:,} markings are not all"]
         settling = self._settling()
+        if first.complete or first.engine.reason == "interrupted":
+            if first.n_markings > FEW_MARKINGS:
+                settling.follow_runs(self.deadline, FOLLOWED_VERTICES)
+            return self._explored(first, settling.found)
+        course = [f"the first {first.n_markings:,} markings are not all"]
         ends: dict[str, ReachabilityGraph] = {}
         space = self._whole(settling, course, ends)
         if space is not None:  # sets may take far longer than one run that is nearby
-            share = _share(self.deadline, _FORMULAS_SHARE)
-            self._ask_formulas(settling, share, _FORMULA_SLICES_SECONDS[:1], {Logic.LTL})
+            self._ask_formulas(settling)
         # What had no room with indexes may have it without.
         late = {Method.COMPACT: _COUNTING_SHARE} if {"memory", "markings"} & set(ends) else {}
-        report = self._report(space or first, settling.found if space is None else settling.shown())
+        report = self._report(space or first, settling.found)
         if space is None:  # as far as anybody came, and not as far as was looked before the race
             furthest = next((graph.bound for reason, graph in ends.items() if reason in _OF_BUDGET), first.bound)
             report = replace(report, verdicts=tuple(_reaching(of, first, furthest) for of in report.verdicts))
@@ -208,37 +216,42 @@ class _Check:
 
     def _settled_by(self, graph: ReachabilityGraph, settling: Settling, report: CheckReport) -> list[str]:
         """Settle what a part of the markings decides and is open yet, whatever the rest are; how that is told."""
+        if not any(of.status is Status.UNKNOWN and of.name not in settling.found for of in report.verdicts):
+            return []
         seen = self._report(graph.until(_moment(self.deadline, _SEEN_SHARE)), settling.found)
         open_ = {of.name for of in report.verdicts if of.status is Status.UNKNOWN} - settling.found.keys()
         decided = {of.name: of for of in seen.verdicts if of.name in open_ and of.status is not Status.UNKNOWN}
         settling.found |= decided
         return [*seen.course, *([f"explored, and not all: {', '.join(sorted(decided))}"] if decided else [])]
 
-    def _begin(self, settling: Settling, deadline: Deadline) -> None:
-        """Settle, beside the search for all markings, what others follow from, by quick techniques."""
-        if deadline.cancelled is not None and deadline.cancelled.wait(_ALONE_SECONDS):
+    def _begin(self, settling: Settling, deadline: Deadline, enough: Event) -> None:
+        """Settle, beside the search for all markings, what others follow from, by quick techniques, and what is stated.
+
+        `enough` ends it, with the search, and is set where nothing is left that all markings are wanted for.
+        """
+        if enough.wait(_ALONE_SECONDS):
             return
         for of, share in FIRST_KNOWERS.items() if self.of_the_net else ():
             settling.learn(of, _LEARNT_FIRST, _moment(deadline, share))
-        self._ask_formulas(settling, deadline, _FORMULA_SLICES_SECONDS)
-        if self.of_the_net:
-            settling.ask(_asked_of(DEADLOCK_FREE), (), _FIRST_LANES, deadline, _FIRST_SLICES_SECONDS)
+        asked = [*([DEADLOCK_FREE] if self.of_the_net else []), *map(temporal_question, self._temporal)]
+        asked += [question_of(query) for query in self.queries]
+        settling.ask_in_turns(map(_asked_of, asked), (), _FIRST_LANES, deadline, _FIRST_SLICES_SECONDS)
+        is_all = not self.of_the_net and len(self._temporal) == len(self.net.properties)
+        if is_all and all(question.name in settling.found for question in asked):
+            enough.set()
 
-    def _ask_formulas(
-        self,
-        settling: Settling,
-        deadline: Deadline,
-        slices_seconds: Sequence[float],
-        logics: Collection[Logic] = frozenset(Logic),
-    ) -> None:
+    @property
+    def _temporal(self) -> list[TemporalProperty]:
+        return [of for of in self.net.properties if isinstance(of, TemporalProperty)]
+
+    def _ask_formulas(self, settling: Settling) -> None:
         """Settle the formulas that do not come down to goals, one after the other, as far as that is quick."""
-        queries = [query for query in self.queries if query.formula and not as_goal(query.formula)]
-        temporal = [of for of in self.net.properties if isinstance(of, TemporalProperty) and not as_goal(of.formula)]
-        asked = [(temporal_question(of), of.logic) for of in temporal]
-        asked += [(question_of(query), Logic(query.kind)) for query in queries]
-        for question, logic in asked:
-            if logic in logics and not deadline.over:
-                settling.ask(_asked_of(question), (), FORMULA_LANES, deadline, slices_seconds)
+        asked = [temporal_question(of) for of in self._temporal if not as_goal(of.formula)]
+        asked += [question_of(query) for query in self.queries if query.formula and not as_goal(query.formula)]
+        share = self.deadline.share(_FORMULAS_SHARE)
+        for later, question in zip(range(len(asked), 0, -1), asked, strict=True):
+            turn = share.share(1 / later).within(_FORMULA_SECONDS_MAX)
+            settling.ask(_asked_of(question), (), FORMULA_LANES, turn, None)
 
     def by(self, method: Method) -> CheckReport:
         """The report of one technique: what it does not decide stays unknown."""
@@ -290,9 +303,9 @@ class _Check:
             self.interrupted.set()
             return _told(report(), [INTERRUPTED])
 
-    def _explored(self, graph: ReachabilityGraph) -> CheckReport:
+    def _explored(self, graph: ReachabilityGraph, known: Mapping[str, Verdict] = MappingProxyType({})) -> CheckReport:
         """The report on a graph, and whether Ctrl-C ended the graph: then its figures are not those of the net."""
-        report = _told(self._report(graph), [f"explored: {_size(graph)}"])
+        report = _told(self._report(graph, known), [f"explored: {_size(graph)}"])
         if graph.engine.reason != "interrupted":
             return report
         self.interrupted.set()  # not before: what was found is still asked
@@ -312,10 +325,11 @@ class _Check:
         `ends` is given what the explicit engine has found, by the reason why it ended. The settling is begun beside it,
         and given up where all markings are there.
         """
-        limits = Limits(_share(self.deadline, _SPACES_SHARE), self.budget.memory_bytes)
         enough, space = Event(), None
+        deadline = replace(self.deadline.share(_SPACES_SHARE), cancelled=enough)
+        limits = Limits(deadline, self.budget.memory_bytes)
         with ThreadPoolExecutor(1) as beside:
-            begun = beside.submit(self._begin, settling, replace(limits.deadline, cancelled=enough))
+            begun = beside.submit(self._begin, settling, deadline, enough)
             contestants = [Contestant("explicit engine", partial(self._held_explicitly, ends))]
             contestants += [Contestant(of.words, partial(_held, of, self.net)) for of in SPACES.values()]
             contestants = _by_two_when_alone(contestants, begun.done)
@@ -361,7 +375,7 @@ class _Check:
             ends[str(graph.engine.reason)] = graph
         graph.require_complete()
         worth_seconds = _WAITED_SHARE * len(self.net.possibilities) * (monotonic() - began)
-        until = _share(limits.deadline, _WAITED_SHARE_MAX).within(worth_seconds)
+        until = limits.deadline.share(_WAITED_SHARE_MAX).within(worth_seconds)
         while not until.over and not (limits.second_free is not None and limits.second_free()):
             sleep(_WAITED_TURN_SECONDS)
         return graph
@@ -388,14 +402,12 @@ class _Check:
         settling.conclude(report.verdicts)
         for of, share in knowers.items():
             settling.learn(of, {verdict.name for verdict in open_()}, _moment(self.deadline, share, of))
-            settling.conclude(report.verdicts)
+            settling.conclude()
         fired = self._fired(report.space) if open_() else set()
         waiting = [verdict for verdict in open_() if settling.may_ask(verdict)]
-        for left, verdict in zip(range(len(waiting), 0, -1), waiting, strict=True):
-            settling.ask(verdict, fired, lanes, _share(self.deadline, 1 / left), slices_seconds)
-            settling.conclude(report.verdicts)
+        settling.ask_in_turns(waiting, fired, lanes, self.deadline, slices_seconds)
         settling.learn_on({verdict.name for verdict in open_()}, _moment(self.deadline, 1.0))
-        settling.conclude(report.verdicts)
+        settling.conclude()
         verdicts = tuple(
             settling.found.get(verdict.name, verdict) if verdict.status is Status.UNKNOWN else verdict
             for verdict in report.verdicts
@@ -442,12 +454,7 @@ def _by_two_when_alone(contestants: Sequence[_Contestant], is_idle: Callable[[],
 def _moment(deadline: Deadline, share: float, of: Method | None = None) -> Deadline:
     """When a technique that knows things at once must have said them; one that looks at all markings has longer."""
     longest = _COUNTING_SECONDS_MAX if of is Method.COMPACT else _KNOWING_SECONDS_MAX
-    return _share(deadline, share).within(longest)
-
-
-def _share(deadline: Deadline, share: float) -> Deadline:
-    left = deadline.left_seconds
-    return deadline if left is None else deadline.within(left * share)
+    return deadline.share(share).within(longest)
 
 
 def _size(space: StateSpace[Any]) -> str:

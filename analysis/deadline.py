@@ -42,6 +42,15 @@ class Deadline:
         """
         return Deadline(min(self.at_seconds, monotonic() + seconds), self.cancelled)
 
+    def share(self, share: float) -> Deadline:
+        """The moment at which so large a part of the time that is left has gone; this one where the clock sets no end.
+
+        >>> Deadline.after(60).share(0).over, Deadline().share(0).over
+        (True, False)
+        """
+        left = self.left_seconds
+        return self if left is None else self.within(left * share)
+
     @property
     def over(self) -> bool:
         """Whether the moment has come."""

@@ -28,7 +28,7 @@ if TYPE_CHECKING:  # the command line reads this table for its help, and so load
     GoalDecider = Callable[[Net, Formula, Limits], Finding]
     SpaceMaker = Callable[[Net, Limits], StateSpace[Any]]
     Knower = Callable[[Net], Callable[[Limits], Mapping[str, Known]]]
-    FormulaDecider = Callable[[Net, Temporal, Limits], Known]
+    FormulaDecider = Callable[[Net], Callable[[Temporal, Limits], Known]]
 
 
 class Method(StrEnum):
@@ -68,12 +68,14 @@ class Technique(Generic[F]):
 
 
 @dataclass(frozen=True, slots=True)
-class Anew(Technique["Knower"]):
-    """A technique that knows, and begins anew each time that it is asked: a function of the net and the limits."""
+class Anew(Technique[F]):
+    """A technique that begins anew each time that it is asked about a net: a function of the net and the rest."""
 
-    def load(self) -> Knower:
-        """What makes of a net what is asked with limits."""
-        return partial(partial, _named(self.at))
+    def load(self) -> F:
+        """What makes of a net what is asked."""
+        function: Any = partial(partial, _named(self.at))
+        made: F = function
+        return made
 
 
 def _named(at: str) -> Any:
@@ -129,10 +131,8 @@ GOALS: Final[dict[Method, Technique[GoalDecider]]] = {
 }
 
 FORMULAS: Final[dict[Logic, dict[Method, Technique[FormulaDecider]]]] = {
-    Logic.LTL: {
-        Method.ON_THE_FLY: Technique("on the fly", "firable.analysis.temporal.on_the_fly:decide_ltl_on_the_fly")
-    },
-    Logic.CTL: {Method.ON_THE_FLY: Technique("on the fly", "firable.analysis.temporal.by_parts:decide_ctl_by_parts")},
+    Logic.LTL: {Method.ON_THE_FLY: Anew("on the fly", "firable.analysis.temporal.on_the_fly:decide_ltl_on_the_fly")},
+    Logic.CTL: {Method.ON_THE_FLY: Technique("on the fly", "firable.analysis.temporal.by_parts:CtlByParts")},
 }
 
 GOAL_LANES: Final[tuple[tuple[Method, ...], ...]] = (

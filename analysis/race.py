@@ -26,6 +26,8 @@ T = TypeVar("T")
 
 SLICES_SECONDS: Final = (2.0, 10.0, 60.0)
 """How long each technique may try in each round of its lane."""
+_GROWTH: Final = 4.0
+"""How much longer a slice is than the one before it where the time is short: only the last takes all that is left."""
 _TURN_SECONDS: Final = 0.1
 _START_SECONDS: Final = 1.0
 
@@ -114,12 +116,14 @@ class _Course(Generic[T]):
 
     def _go(self, lane: Sequence[Contestant[T]], limits: Limits, slices_seconds: Sequence[float] | None) -> None:
         """Its techniques in turn, in slices that grow; one that gives up early is not asked again."""
-        waiting = list(lane)
-        for seconds in slices_seconds or (None,):
+        waiting, left = list(lane), limits.deadline.left_seconds
+        slices = slices_seconds or (None,)
+        for later, seconds in zip(range(len(slices) - 1, -1, -1), slices, strict=True):
+            longest = seconds if left is None or seconds is None else min(seconds, left * _GROWTH**-later)
             for contestant in list(waiting):
                 if self.over.is_set() or limits.deadline.over:
                     return
-                until = self._until(limits.deadline, seconds)
+                until = self._until(limits.deadline, longest)
                 gave_up = self._try(contestant, replace(limits, deadline=until))
                 if gave_up and not until.over:
                     waiting.remove(contestant)

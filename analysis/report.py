@@ -12,7 +12,7 @@ here.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import partial
 from types import MappingProxyType
@@ -22,7 +22,7 @@ from firable.analysis.goal import Finding
 from firable.analysis.question import Answer, Question
 from firable.analysis.spaces.reachability import BudgetExceeded, IncompleteGraph, ReachabilityGraph
 from firable.analysis.spaces.space import StateSpace
-from firable.analysis.temporal.queries import answer
+from firable.analysis.temporal.queries import answer, decide_temporal
 from firable.analysis.verdicts import behaviour as behaviour_of
 from firable.analysis.verdicts import conflicts as conflict
 from firable.analysis.verdicts.behaviour import Behaviour
@@ -37,7 +37,8 @@ from firable.analysis.verdicts.properties import decide_stated
 from firable.analysis.verdicts.starvation import starvation_free
 from firable.nets.formula import Formula
 from firable.nets.net import Net, Property, TemporalProperty
-from firable.nets.queries import Query
+from firable.nets.queries import Query, QueryKind
+from firable.nets.temporal import Logic
 from firable.nets.verdict import Status, Verdict, Weight, Witness, overall
 from firable.semantics.player import Player
 from firable.semantics.trace import Discipline
@@ -143,15 +144,16 @@ class CheckReport:
 
 def report_on(
     space: StateSpace[Any],
-    queries: Iterable[Query] = (),
+    queries: Sequence[Query] = (),
     known: Mapping[str, Verdict] = MappingProxyType({}),
     *,
     of_the_net: bool = True,
 ) -> CheckReport:
     """Decide every verdict of this room, and the queries, on a state space that was explored before.
 
-    Of temporal properties and of queries the verdicts that are `known`, by name, are taken as they are. The verdicts on
-    the net itself are left out, with their figures, where not `of_the_net`.
+    Of temporal properties and of queries the verdicts that are `known`, by name, are taken as they are; of a formula
+    that no run shows yet the space is asked for one in the end. The verdicts on the net itself are left out, with their
+    figures, where not `of_the_net`.
     """
     behaviour, conflicts = Behaviour(space), ConflictAnalysis(space)
     steps = _steps(space)
@@ -171,31 +173,55 @@ def report_on(
         *(partial(decide, space) for decide in _ON_SPACE),
         partial(starvation_free, behaviour),
     ]
-    asks: list[Callable[[], Verdict]] = [
-        *(on_the_net if of_the_net else ()),
+    stated: list[Callable[[], Verdict]] = [
         *(partial(on_property, of) for of in space.net.properties),
         *(partial(on_query, query) for query in queries),
     ]
-    verdicts = _in_turn(space, asks)
+    verdicts = _in_turn(space, on_the_net if of_the_net else [], stated, _shows(space, queries, known))
     found = figures(behaviour, conflicts, steps) if of_the_net else Figures(**_size(space))
     return CheckReport(space.net, space.discipline, found, verdicts, space)
 
 
-def _in_turn(space: StateSpace[Any], asks: Sequence[Callable[[], Verdict]]) -> tuple[Verdict, ...]:
-    """What is answered, in the order of the questions."""
-    verdicts = []
-    for ask in asks:
-        with space.turn(_TURN_SHARE):
+def _in_turn(
+    space: StateSpace[Any],
+    on_the_net: Sequence[Callable[[], Verdict]],
+    stated: Sequence[Callable[[], Verdict]],
+    shows: Mapping[str, Callable[[], Verdict]],
+) -> tuple[Verdict, ...]:
+    """What is answered, in the order of the questions; of what is known, what `shows` it, where there is time."""
+    asks, verdicts = [*on_the_net, *stated], []
+    for later, ask in zip(range(len(asks), 0, -1), asks, strict=True):
+        # Of what is stated one is as good as another, while of the net it is one fixed point that takes the time.
+        with space.turn(_TURN_SHARE if later > len(stated) else min(_TURN_SHARE, 1 / later)):
             verdicts.append(ask())
-    if space.complete and space.deadline.left_seconds is not None:
+    if not space.complete:
+        return tuple(verdicts)
+    if space.deadline.left_seconds is not None:
         late = [i for i, verdict in enumerate(verdicts) if verdict.status is Status.UNKNOWN and verdict.code == "F3004"]
         for left, i in zip(range(len(late), 0, -1), late, strict=True):
             if not space.deadline.over:
                 with space.turn(1 / (left + 1)):
                     verdicts[i] = asks[i]()
+    bare = [i for i, verdict in enumerate(verdicts) if verdict.name in shows]
+    for left, i in zip(range(len(bare), 0, -1), bare, strict=True):
+        with space.turn(1 / (left + 1), _SHOWING_SECONDS_MAX):
+            shown = shows[verdicts[i].name]()
+        verdicts[i] = shown if shown.witness is not None else verdicts[i]
     return tuple(verdicts)
 
 
+def _shows(
+    space: StateSpace[Any], queries: Sequence[Query], known: Mapping[str, Verdict]
+) -> dict[str, Callable[[], Verdict]]:
+    """What asks the space, by name, about the formulas of CTL that are known and that no run shows."""
+    temporal = [of for of in space.net.properties if isinstance(of, TemporalProperty) and of.logic is Logic.CTL]
+    shows = {f"property.{of.name}": partial(decide_temporal, space, of) for of in temporal}
+    shows |= {f"query.{query.name}": partial(answer, space, query) for query in queries if query.kind is QueryKind.CTL}
+    return {name: show for name, show in shows.items() if name in known and known[name].witness is None}
+
+
+_SHOWING_SECONDS_MAX: Final = 5.0
+"""How long a run is looked for that shows a verdict which is known."""
 _TURN_SHARE: Final = 0.4
 """The part of the time left that one verdict may take before the others have been asked for."""
 _FIGURE_SHARE: Final = 0.1

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from threading import Event
 from time import perf_counter
 from typing import Final
@@ -27,14 +27,16 @@ from firable.analysis.methods import FORMULAS, GOALS, KNOWERS, WORTH_ASKING, Ane
 from firable.analysis.question import Answer, Known, Question, no, yes
 from firable.analysis.race import SLICES_SECONDS, Contestant, Outcome, T, race
 from firable.analysis.spaces.space import WitnessError
-from firable.analysis.temporal.queries import question_of
+from firable.analysis.temporal.on_the_fly import decide_ltl_on_the_fly
+from firable.analysis.temporal.queries import as_goal, question_of, temporal_question
 from firable.analysis.verdicts.behaviour import QUESTIONS
 from firable.analysis.verdicts.bounds import greatest
 from firable.analysis.verdicts.combined import combined, is_combined
 from firable.analysis.verdicts.consequences import consequences
 from firable.analysis.verdicts.goals import Goal, goals_of, is_of_the_net, query_goals
 from firable.analysis.verdicts.starvation import STARVATION
-from firable.nets.formula import Count, Formula, format_count
+from firable.analysis.walk import Walks
+from firable.nets.formula import Count, Deadlock, Formula, format_count
 from firable.nets.net import Net, TemporalProperty
 from firable.nets.queries import Query, QueryKind
 from firable.nets.temporal import Logic, Temporal
@@ -52,6 +54,10 @@ _SAID_BY: Final = {
     QueryKind.ONE_SAFE: "contact-free",
 }
 _GOALS_MAX: Final = 64  # a verdict of more goals than this takes longer than anybody waits
+_TURN_SECONDS: Final = 0.25  # for each question in the first turn
+_TURN_SECONDS_MAX: Final = 30.0  # in the last but one, where no time is given
+_TURN_GROWTH: Final = 4.0
+_NEARBY_FIRINGS: Final = 2**13  # of a walk before the race, some milliseconds
 _QUESTIONS: Final = {question.name: question for question in (*QUESTIONS, STARVATION)}
 
 
@@ -76,14 +82,12 @@ class Settling:
     reached: dict[str, str] = field(default_factory=dict)
     _knowing: dict[Method, Callable[[Limits], Mapping[str, Known]]] = field(default_factory=dict)
     """Who was asked already what they know."""
-
-    def shown(self) -> dict[str, Verdict]:
-        """What was found but formulas of CTL that nothing shows: sets of markings give a run for most of these."""
-        return {name: verdict for name, verdict in self.found.items() if verdict.witness or not self._branches(name)}
-
-    def _branches(self, name: str) -> bool:
-        found = self._formula_of(name)
-        return found is not None and found[1] is Logic.CTL
+    _given: dict[str, Verdict] = field(default_factory=dict)
+    """What was decided elsewhere."""
+    _met: dict[Formula, Finding] = field(default_factory=dict)
+    """The goals that are decided: several verdicts may come down to one, and a verdict to several."""
+    _walked: set[Formula] = field(default_factory=set)
+    _judges: dict[tuple[Logic, Method], Callable[[Temporal, Limits], Known]] = field(default_factory=dict)
 
     def learn(self, of: Method, among: Collection[str], deadline: Deadline) -> None:
         """Take from a technique what it knows at once of these verdicts, by name."""
@@ -110,13 +114,13 @@ class Settling:
             if not isinstance(KNOWERS[of], Anew):
                 self.learn(of, among, deadline)
 
-    def conclude(self, verdicts: Iterable[Verdict]) -> None:
-        """Add what follows from these verdicts and those that were found."""
-        decided = {verdict.name: verdict for verdict in verdicts if verdict.status is not Status.UNKNOWN}
-        following = consequences(self.net, decided | self.found)
+    def conclude(self, verdicts: Iterable[Verdict] = ()) -> None:
+        """Add what follows from these verdicts, those that were given before, and those that were found."""
+        self._given |= {verdict.name: verdict for verdict in verdicts if verdict.status is not Status.UNKNOWN}
+        following = consequences(self.net, self._given | self.found)
         for name, known in following.items():
             self._settle(_QUESTIONS[name], known.answer, known.method, Cost(seconds=0.0))
-        self._pass_on(decided | self.found)
+        self._pass_on(self._given | self.found)
 
     def may_ask(self, verdict: Verdict) -> bool:
         """Whether `ask` may have anything to ask: the verdict comes down to goals, to a formula, or to a bound."""
@@ -157,6 +161,43 @@ class Settling:
         if finding is not None:
             self._settle(question, yes(finding.witness), finding.method, finding.cost)
 
+    def follow_runs(self, deadline: Deadline, vertices: int) -> None:
+        """Settle the formulas of LTL that are decided on the fly at so many vertices; the same ones on every day."""
+        queries = [(question_of(query), query.formula) for query in self.queries if query.kind is QueryKind.LTL]
+        stated = [of for of in self.net.properties if isinstance(of, TemporalProperty) and of.logic is Logic.LTL]
+        for question, formula in [*((temporal_question(of), of.formula) for of in stated), *queries]:
+            if formula is None or as_goal(formula) is not None or deadline.over:
+                continue
+            limits = self._limits(question.name, deadline)
+            try:
+                known = decide_ltl_on_the_fly(self.net, formula, limits, turns=[(None, vertices)])
+            except IncompleteGraph:
+                continue
+            self._settle(question, known.answer, known.method, known.cost)
+
+    def ask_in_turns(
+        self,
+        verdicts: Iterable[Verdict],
+        fired: Collection[str],
+        lanes: Lanes,
+        deadline: Deadline,
+        slices_seconds: Sequence[float] | None = SLICES_SECONDS,
+    ) -> None:
+        """Settle verdicts, the easy ones first: all are asked in turns that grow, of which the last share out the time.
+
+        Which one is hard cannot be seen beforehand, and one that is would take its time from all others.
+        """
+        seconds, waiting = _TURN_SECONDS, list(verdicts)
+        while waiting:
+            left = deadline.left_seconds
+            is_last = len(waiting) == 1 or seconds > (_TURN_SECONDS_MAX if left is None else left / len(waiting))
+            for later, verdict in zip(range(len(waiting), 0, -1), waiting, strict=True):
+                until = deadline.share(1 / later) if is_last else deadline.within(seconds)
+                self.ask(verdict, fired, lanes, until, slices_seconds)
+                self.conclude()
+            waiting = [] if is_last else [verdict for verdict in waiting if verdict.name not in self.found]
+            seconds *= _TURN_GROWTH
+
     def _by_formula(
         self, verdict: Verdict, lanes: Lanes, deadline: Deadline, slices_seconds: Sequence[float] | None
     ) -> None:
@@ -169,16 +210,23 @@ class Settling:
             self._combine(verdict, formula, lanes, deadline, slices_seconds)
         able = FORMULAS[logic]
         contestants = [
-            [Contestant(able[of].words, partial(_judged, logic, of, self.net, formula)) for of in lane if of in able]
+            [Contestant(able[of].words, partial(self._judge(logic, of), formula)) for of in lane if of in able]
             for lane in lanes
         ]
         if verdict.name in self.found or deadline.over or not any(contestants):
             return
         limits = self._limits(verdict.name, deadline)
-        outcome = self._told(verdict.name, self.noted(race(contestants, limits, slices_seconds)))
+        longest = slices_seconds and slices_seconds[-1:]  # to begin anew helps nobody
+        outcome = self._told(verdict.name, self.noted(race(contestants, limits, longest)))
         if (known := outcome.answer) is not None:
             question = Question(verdict.name, verdict.statement, verdict.weight)
             self._settle(question, known.answer, known.method, known.cost)
+
+    def _judge(self, logic: Logic, of: Method) -> Callable[[Temporal, Limits], Known]:
+        """Who is asked about formulas of a logic, and keeps what it finds for the next one."""
+        if (logic, of) not in self._judges:
+            self._judges[logic, of] = FORMULAS[logic][of].load()(self.net)
+        return self._judges[logic, of]
 
     def _by_halving(
         self, verdict: Verdict, lanes: Lanes, deadline: Deadline, slices_seconds: Sequence[float] | None
@@ -264,6 +312,8 @@ class Settling:
         self, name: str, goal: Goal, lanes: Lanes, deadline: Deadline, slices_seconds: Sequence[float] | None
     ) -> Finding | None:
         """What the first technique finds that decides a goal; None where none does in time."""
+        if goal.formula in self._met:
+            return self._met[goal.formula]
         if deadline.over:
             return None
         contestants = [
@@ -273,7 +323,28 @@ class Settling:
         if not any(contestants):
             return None
         limits = self._limits(name, deadline)
-        return self._told(name, self.noted(race(contestants, limits, slices_seconds))).answer
+        walks = any(Method.WALK in lane for lane in lanes)
+        finding = self._nearby(name, goal.formula, limits) if walks else None
+        if finding is None:
+            finding = self._told(name, self.noted(race(contestants, limits, slices_seconds))).answer
+        if finding is not None:
+            self._met[goal.formula] = finding
+        return finding
+
+    def _nearby(self, name: str, goal: Formula, limits: Limits) -> Finding | None:
+        """A goal that a short walk meets, when it is first asked: most that are met at all are met within it."""
+        if goal in self._walked or isinstance(goal, Deadlock):
+            return None
+        self._walked.add(goal)
+        finding = self._walks.decide(goal, limits, firings=_NEARBY_FIRINGS)
+        if not finding.reachable:
+            return None
+        self.course.append(f"{name}: a short walk was first")
+        return finding
+
+    @cached_property
+    def _walks(self) -> Walks:
+        return Walks(self.net)
 
     def _limits(self, name: str, deadline: Deadline) -> Limits:
         """The limits of who is asked about a verdict, whose words are told as being about that."""
@@ -325,8 +396,3 @@ def _decided(of: Method, net: Net, formula: Formula, limits: Limits) -> Finding 
     if found.reachable:
         _marking_of(net, formula, found)
     return found
-
-
-def _judged(logic: Logic, of: Method, net: Net, formula: Temporal, limits: Limits) -> Known:
-    """What a technique says of a formula; raises `IncompleteGraph` where it does not decide."""
-    return FORMULAS[logic][of].load()(net, formula, limits)

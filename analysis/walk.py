@@ -33,6 +33,31 @@ _FIRINGS_MAX: Final = 2**40
 """Hours of walking: it is the deadline that ends a walk."""
 
 
+class Walks:
+    """Walks in one net, for one goal after the other: to make the net ready takes longer than a short walk."""
+
+    def __init__(self, net: Net) -> None:
+        self.net = net
+        self._engine = Stubborn(*flat(net))
+
+    def decide(self, goal: Formula, limits: Limits, *, seed: int = SEED, firings: int = _FIRINGS_MAX) -> Finding:
+        """Look for a marking that satisfies the goal; never says that it is not reachable.
+
+        Ends after so many firings, or with the limits.
+        """
+        start, witnesses = perf_counter(), Witnesses(self.net, Discipline.INTERLEAVING)
+        nodes = None if isinstance(goal, Deadlock) else nodes_of(self.net, goal)
+        path, steps = self._engine.walk(nodes, seed=seed, max_steps=firings, **engine_limits(limits.deadline))
+        cost = Cost(edges=steps, seconds=perf_counter() - start)
+        if path is None:
+            return Finding(None, METHOD, bound=f"{steps:,} random firings did not meet it", cost=cost)
+        sequence = [(t,) for t in path]
+        reached = witnesses.play(self.net.initial_marking, sequence)
+        if not evaluate(BOOL, self.net, goal, holds_in(reached)):
+            raise WitnessError("a walk ends in a marking that does not satisfy the goal")
+        return Finding(reachable=True, method=METHOD, witness=witnesses.named(sequence, reached), cost=cost)
+
+
 def decide_by_walk(
     net: Net, goal: Formula, limits: Limits, *, seed: int = SEED, firings: int = _FIRINGS_MAX
 ) -> Finding:
@@ -45,15 +70,4 @@ def decide_by_walk(
     >>> decide_by_walk(catalogue_net("one_robot_mc_late"), Deadlock(), Limits()).reachable
     True
     """
-    start, witnesses = perf_counter(), Witnesses(net, Discipline.INTERLEAVING)
-    engine = Stubborn(*flat(net))
-    nodes = None if isinstance(goal, Deadlock) else nodes_of(net, goal)
-    path, steps = engine.walk(nodes, seed=seed, max_steps=firings, **engine_limits(limits.deadline))
-    cost = Cost(edges=steps, seconds=perf_counter() - start)
-    if path is None:
-        return Finding(None, METHOD, bound=f"{steps:,} random firings did not meet it", cost=cost)
-    sequence = [(t,) for t in path]
-    reached = witnesses.play(net.initial_marking, sequence)
-    if not evaluate(BOOL, net, goal, holds_in(reached)):
-        raise WitnessError("a walk ends in a marking that does not satisfy the goal")
-    return Finding(reachable=True, method=METHOD, witness=witnesses.named(sequence, reached), cost=cost)
+    return Walks(net).decide(goal, limits, seed=seed, firings=firings)

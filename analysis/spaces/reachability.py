@@ -13,9 +13,11 @@ than the graph. Those of places are kept, packed, as far as they fit: questions 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import inf
 from typing import TYPE_CHECKING, Any, Final
 
 from firable.analysis import _engine
@@ -86,6 +88,7 @@ class ReachabilityGraph(Derived["Column"]):
     budget: Budget
     engine: _engine.Graph
     deadline: Deadline = NEVER
+    _turns: list[Deadline] = field(default_factory=list, init=False, compare=False, repr=False)
 
     @cached_property
     def algebra(self) -> Bitwise[Column]:
@@ -130,7 +133,7 @@ class ReachabilityGraph(Derived["Column"]):
     @property
     def _limits(self) -> dict[str, Any]:
         """What ends the engine's long work."""
-        return engine_limits(self.deadline)
+        return engine_limits(self._moment)
 
     @cached_property
     def ascending(self) -> npt.NDArray[np.intp]:
@@ -147,6 +150,22 @@ class ReachabilityGraph(Derived["Column"]):
     def until(self, deadline: Deadline) -> ReachabilityGraph:
         """The same graph, for questions that end with another deadline."""
         return replace(self, deadline=deadline)
+
+    @contextmanager
+    def turn(self, share: float, most_seconds: float = inf, /) -> Iterator[Deadline]:
+        """Let what passes over all markings meanwhile take at most this part of the time left, and so many seconds."""
+        left = self._moment.left_seconds
+        turn = self._moment.within(most_seconds if left is None else min(most_seconds, left * share))
+        self._turns.append(turn)
+        try:
+            yield turn
+        finally:
+            self._turns.pop()
+
+    @property
+    def _moment(self) -> Deadline:
+        """When the question of this turn ends."""
+        return self._turns[-1] if self._turns else self.deadline
 
     def require_complete(self) -> None:
         """Raise `IncompleteGraph` unless the whole graph is known."""
@@ -224,7 +243,7 @@ class ReachabilityGraph(Derived["Column"]):
 
         result = self.none()
         for start in range(0, self.n_markings, PART):
-            if start and self.deadline.over:
+            if start and self._moment.over:
                 raise BudgetExceeded(REASONS["time"])
             part = result[start : start + PART]
             found = unpacked(term(COLUMNS, self._places.reader(start)))

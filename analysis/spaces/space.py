@@ -242,7 +242,7 @@ class Derived(Generic[S]):
     """The second half of a state space, from the first."""
 
     def turn(self: StateSpace[S], _: float, __: float = inf, /) -> AbstractContextManager[Deadline]:
-        """No limit: to pass over markings that are held one by one is short beside finding them."""
+        """No limit."""
         return nullcontext(self.deadline)
 
     def satisfying(self: StateSpace[S], formula: Formula) -> S:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from time import perf_counter
 from typing import Final
 
@@ -24,7 +25,7 @@ from firable.analysis.reduction.deciding import decide_by_reduction
 from firable.analysis.temporal.local import METHOD, decide_ctl_on_the_fly
 from firable.analysis.temporal.queries import as_goal
 from firable.analysis.temporal.simplifying import FALSE, TRUE, implied, simplified
-from firable.analysis.walk import decide_by_walk
+from firable.analysis.walk import Walks
 from firable.nets.formula import And, Constant, Formula, Not, Or, Start
 from firable.nets.net import Net, holding
 from firable.nets.temporal import (
@@ -49,7 +50,7 @@ _GLANCE: Final = 0.05  # of the time that is left, for a first local evaluation
 _CONSTANTS: Final = 0.5  # for state formulas that hold always or never
 _EACH: Final = 0.1  # for one of these
 _PART: Final = 0.4  # for each part by goals
-_WALK_SECONDS: Final = 0.02
+_FIRINGS: Final = 2**15  # of a walk, before a net is reduced for a goal
 _NEXT_MAX: Final = 16
 """Next markings that are asked one by one."""
 
@@ -66,24 +67,66 @@ def decide_ctl_by_parts(net: Net, formula: Temporal, limits: Limits) -> Known:
     >>> [decide_ctl_by_parts(net, parse_temporal(text), Limits()).answer.holds for text in texts]
     [True, False, False]
     """
-    began = perf_counter()
-    parts = _Parts(net, limits)
-    holds, witness = parts.decided(formula)
-    if holds is None:
-        raise IncompleteGraph("not decided by goals and local evaluation")
-    method = "; ".join(dict.fromkeys(parts.methods)) or "the initial marking"
-    hint = "" if holds or witness else "it was evaluated marking by marking: no run is kept that shows it"
-    return Known(Answer(holds, witness=witness, hint=hint), method, Cost(seconds=perf_counter() - began))
+    return CtlByParts(net)(formula, limits)
+
+
+class CtlByParts:
+    """Formulas of CTL on one net, one after the other: what is found of goals for one of them is kept for all."""
+
+    def __init__(self, net: Net) -> None:
+        self._goals = _Goals(net)
+
+    def __call__(self, formula: Temporal, limits: Limits) -> Known:
+        """As `decide_ctl_by_parts`."""
+        began = perf_counter()
+        parts = _Parts(self._goals, limits)
+        holds, witness = parts.decided(formula)
+        if holds is None:
+            raise IncompleteGraph("not decided by goals and local evaluation")
+        method = "; ".join(dict.fromkeys(parts.methods)) or "the initial marking"
+        hint = "" if holds or witness else "it was evaluated marking by marking: no run is kept that shows it"
+        return Known(Answer(holds, witness=witness, hint=hint), method, Cost(seconds=perf_counter() - began))
+
+
+@dataclass
+class _Goals:
+    """A net with what was found of goals in it."""
+
+    net: Net
+    findings: dict[Formula, Finding] = field(default_factory=dict)
+
+    @cached_property
+    def walks(self) -> Walks:
+        """Walks in the net."""
+        return Walks(self.net)
+
+    def found(self, goal: Formula, limits: Limits) -> Finding | None:
+        """What is found of a goal; None where it is not decided."""
+        if goal in self.findings:
+            return self.findings[goal]
+        walk, reduction = partial(self.walks.decide, firings=_FIRINGS), partial(decide_by_reduction, self.net)
+        for decide in (walk, reduction):
+            try:
+                finding = decide(goal, limits)
+            except (BudgetExceeded, IncompleteGraph):
+                continue
+            if finding.reachable is not None:
+                self.findings[goal] = finding
+                return finding
+        return None
 
 
 @dataclass
 class _Parts:
-    """A net with the state formulas of which it is known whether they are constant, and the methods that said so."""
+    """One formula on a net, and the methods that said something of it."""
 
-    net: Net
+    goals: _Goals
     limits: Limits
-    constants: dict[Formula, Formula] = field(default_factory=dict)
     methods: list[str] = field(default_factory=list)
+
+    @property
+    def net(self) -> Net:
+        return self.goals.net
 
     def decided(self, formula: Temporal) -> tuple[bool | None, Witness | None]:
         """The value of a formula in M0, and what shows it where one firing sequence does."""
@@ -95,9 +138,7 @@ class _Parts:
         return self._value(formula)
 
     def _part(self, share: float) -> Limits:
-        deadline = self.limits.deadline
-        left = deadline.left_seconds
-        return self.limits if left is None else replace(self.limits, deadline=deadline.within(left * share))
+        return replace(self.limits, deadline=self.limits.deadline.share(share))
 
     def _holds(self, state: Formula) -> bool:
         return bool(evaluate(BOOL, self.net, state, holds_in(self.net.initial_marking)))
@@ -106,26 +147,17 @@ class _Parts:
         """A constant for a state formula that holds in all reachable markings, or in none."""
         if isinstance(state, Constant) or until.deadline.over:
             return state
-        if state not in self.constants:
-            left = until.deadline.left_seconds
-            each = until if left is None else replace(until, deadline=until.deadline.within(left * _EACH))
-            holds = self._holds(state)
-            finding = self._asked(Not(state) if holds else state, each)
-            self.constants[state] = Constant(holds) if finding is not None and not finding.reachable else state
-        return self.constants[state]
+        holds = self._holds(state)
+        each = replace(until, deadline=until.deadline.share(_EACH))
+        finding = self._asked(Not(state) if holds else state, each)
+        return Constant(holds) if finding is not None and not finding.reachable else state
 
     def _asked(self, goal: Formula, limits: Limits) -> Finding | None:
         """What is found of a goal; None where it is not decided."""
-        quick = replace(limits, deadline=limits.deadline.within(_WALK_SECONDS))
-        for decide, share in ((decide_by_walk, quick), (decide_by_reduction, limits)):
-            try:
-                finding = decide(self.net, goal, share)
-            except (BudgetExceeded, IncompleteGraph):
-                continue
-            if finding.reachable is not None:
-                self.methods.append(finding.method)
-                return finding
-        return None
+        finding = self.goals.found(goal, limits)
+        if finding is not None:
+            self.methods.append(finding.method)
+        return finding
 
     def _locally(self, formula: Temporal, share: float) -> bool | None:
         try:
@@ -199,11 +231,8 @@ class _Parts:
         values = []
         for number, t in enumerate(firable):
             marking = player.fire(self.net.initial_marking, (t,))
-            left = self.limits.deadline.left_seconds
-            share = 1 / (len(firable) - number)
-            within = self.limits.deadline if left is None else self.limits.deadline.within(left * share)
             net = replace(self.net, places=holding(self.net.places, marking))
-            there = _Parts(net, replace(self.limits, deadline=within), methods=self.methods)
+            there = _Parts(_Goals(net), self._part(1 / (len(firable) - number)), self.methods)
             holds, _ = there._value(operand)
             if holds is not every and holds is not None:
                 return holds

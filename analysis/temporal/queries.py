@@ -97,7 +97,7 @@ def decide_temporal(space: StateSpace[Any], of: TemporalProperty) -> Verdict:
 
 
 def question_of(query: Query) -> Question:
-    """The question that a query of any kind but a bound is."""
+    """The question that a query is; the statement of a bound lacks the number."""
     return Question(f"query.{query.name}", _statement(query))
 
 
@@ -114,6 +114,8 @@ def _statement(query: Query) -> str:
     match query.kind:
         case QueryKind.CTL | QueryKind.LTL if query.formula is not None:
             return f"{query.kind.upper()}: {format_temporal(query.formula)}"
+        case QueryKind.BOUND:
+            return f"the greatest {format_count(Count(query.places))} in a reachable marking"
         case QueryKind.LIVE:
             return "every transition can fire again from every reachable marking, external gates free"
         case QueryKind.QUASI_LIVE:
@@ -229,8 +231,7 @@ def _one_safe(space: StateSpace[Any]) -> Answer:
 
 
 def _bounded(space: StateSpace[Any], query: Query) -> Verdict:
-    counted = format_count(Count(query.places))
-    question = Question(f"query.{query.name}", f"the greatest {counted} in a reachable marking")
+    counted, question = format_count(Count(query.places)), question_of(query)
     found: list[int] = []
 
     def find() -> Answer:

@@ -74,6 +74,26 @@ def test_a_slice_ends_a_technique_and_a_longer_one_asks_it_again() -> None:
     assert all(left is not None for left in asked)
 
 
+def test_where_the_time_is_short_slices_grow_up_to_all_of_it() -> None:
+    asked: list[tuple[str, float]] = []
+
+    def note(name: str) -> Callable[[Limits], str | None]:
+        def wait(limits: Limits) -> None:
+            left = limits.deadline.left_seconds
+            assert left is not None
+            asked.append((name, left))
+            while not limits.deadline.over:
+                pass
+
+        return wait
+
+    lane = [Contestant(name, note(name)) for name in ("first", "second")]
+    race([lane], Limits(Deadline.after(1.6)), slices_seconds=(2.0, 10.0, 60.0))
+    assert [name for name, _ in asked] == ["first", "second", "first", "second", "first"]
+    for (_, left), longest in zip(asked, (0.1, 0.1, 0.4, 0.4, 1.6), strict=True):
+        assert longest / 4 < left <= longest
+
+
 def test_a_technique_that_gave_up_early_is_not_asked_again() -> None:
     asked: list[int] = []
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from threading import Event
-from typing import ClassVar
+from time import sleep
+from typing import TYPE_CHECKING, ClassVar
 
 import pytest
 
@@ -12,14 +13,22 @@ from firable.analysis import check as checking
 from firable.analysis import settling
 from firable.analysis.check import check
 from firable.analysis.deadline import NEVER, Deadline
-from firable.analysis.goal import Limits
+from firable.analysis.goal import Finding, Limits
 from firable.analysis.methods import Anew, Method, Technique
-from firable.analysis.question import Known, yes
+from firable.analysis.question import Known, unknown, yes
 from firable.analysis.settling import Settling
 from firable.analysis.spaces.reachability import Budget
+from firable.analysis.temporal.queries import question_of
 from firable.nets.catalogue import catalogue_net
+from firable.nets.formula import Formula
 from firable.nets.net import Net
-from firable.nets.verdict import Status
+from firable.nets.queries import Query, parse_query
+from firable.nets.temporal import Logic, Temporal, parse_temporal
+from firable.nets.verdict import Cost, Status, Verdict
+from firable.semantics.trace import Discipline
+
+if TYPE_CHECKING:
+    from firable.analysis.methods import FormulaDecider, Knower
 
 NET = catalogue_net("one_robot")
 MEMORY_BYTES = 1 << 20
@@ -48,7 +57,7 @@ def forgetful(net: Net, limits: Limits) -> Mapping[str, Known]:
 
 
 FORGETFUL: list[Limits] = []
-ASKED = {
+ASKED: dict[Method, Technique[Knower]] = {
     Method.REDUCTION: Technique("slow", f"{__name__}:Slow"),
     Method.STRUCTURE: Anew("forgetful", f"{__name__}:forgetful"),
 }
@@ -84,3 +93,117 @@ def test_what_is_open_when_all_others_have_done_is_asked_of_who_goes_on(monkeypa
     live = check(NET, budget=Budget(5, MEMORY_BYTES, seconds=60)).verdict("live")
     assert (live.status, live.method) == (Status.PROVED, "slowly")
     assert [slow.asked for slow in Slow.made] == [3]
+
+
+GOALS_MET: list[tuple[Formula, float | None]] = []
+
+
+def by_hard_work(net: Net, goal: Formula, limits: Limits) -> Finding:
+    """Decides what is easy at once, and what is hard (it names `mc.free`) never."""
+    GOALS_MET.append((goal, limits.deadline.left_seconds))
+    while "mc.free" in str(goal) and not limits.deadline.over:
+        sleep(0.01)
+    return Finding(None if "mc.free" in str(goal) else False, "hard work")
+
+
+def settling_of(*texts: str) -> tuple[Settling, list[Verdict]]:
+    queries = tuple(parse_query(text, f"q{at}") for at, text in enumerate(texts))
+    return Settling(NET, queries, MEMORY_BYTES, Event()), [asked(query) for query in queries]
+
+
+def asked(query: Query) -> Verdict:
+    return question_of(query).settle(unknown("not asked yet", ""), "", Discipline.INTERLEAVING, Cost())
+
+
+def by_one_technique(monkeypatch: pytest.MonkeyPatch) -> list[list[Method]]:
+    GOALS_MET.clear()
+    monkeypatch.setattr(settling, "GOALS", {Method.PDR: Technique("hard work", f"{__name__}:by_hard_work")})
+    return [[Method.PDR]]
+
+
+def test_one_that_is_hard_does_not_take_the_time_of_all_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    lanes = by_one_technique(monkeypatch)
+    one, verdicts = settling_of("EF mc.free", "AG not mc.free", "EF start", "AG start")
+    monkeypatch.setattr(settling, "_TURN_SECONDS", 0.05)
+    one.ask_in_turns(verdicts, (), lanes, Deadline.after(1.0))
+    assert one.found.keys() == {"query.q2", "query.q3"}
+    turns = [left for goal, left in GOALS_MET if "mc.free" in str(goal) and left is not None]
+    assert max(turns[:2]) <= 0.05, "in the first turn"
+    assert max(turns) > 0.1, "in the last one"
+
+
+def test_without_a_limit_the_last_turn_is_as_long_as_the_techniques_try(monkeypatch: pytest.MonkeyPatch) -> None:
+    lanes = by_one_technique(monkeypatch)
+    monkeypatch.setattr(settling, "_TURN_SECONDS_MAX", 0.1)
+    monkeypatch.setattr(settling, "_TURN_SECONDS", 0.05)
+    one, verdicts = settling_of("EF mc.free", "AG not mc.free")
+    one.ask_in_turns(verdicts, (), lanes, NEVER, (0.3, 0.4))
+    longest = [left for _, left in GOALS_MET if left is not None]
+    assert 0.35 < max(longest) <= 0.4
+
+
+def test_a_goal_is_decided_once_whoever_comes_down_to_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    lanes = by_one_technique(monkeypatch)
+    one, verdicts = settling_of("EF robot.grasp_cv1", "not EF robot.grasp_cv1", "(EF robot.grasp_cv1) or EF start")
+    for verdict in verdicts:
+        one.ask(verdict, (), lanes, NEVER)
+    assert [one.found[verdict.name].status for verdict in verdicts] == [
+        Status.VIOLATED,
+        Status.PROVED,
+        Status.VIOLATED,
+    ]
+    assert len(GOALS_MET) == 2
+
+
+@pytest.mark.parametrize("walks", [True, False])
+def test_what_is_nearby_is_met_by_a_short_walk_where_walks_are_allowed(
+    monkeypatch: pytest.MonkeyPatch, walks: bool
+) -> None:
+    lanes = [*by_one_technique(monkeypatch), *([[Method.WALK]] if walks else [])]
+    one, (far, near, never) = settling_of("AG not mc.free", "EF mc.machining", "EF (mc.free and mc.machining)")
+    one.ask(near, (), lanes, NEVER)
+    assert (one.found[near.name].status, len(GOALS_MET)) == ((Status.PROVED, 0) if walks else (Status.VIOLATED, 1))
+    if walks:
+        assert one.found[near.name].method == "random walk"
+        assert one.found[near.name].witness is not None
+        one.ask(never, (), lanes, Deadline.after(0.1))
+        assert never.name not in one.found, "a walk concludes nothing"
+        one.ask(far, (), lanes, NEVER)
+        assert one.found[far.name].status is Status.VIOLATED
+
+
+class Forgets:
+    """Judges formulas of CTL on one net, and counts how often it is made."""
+
+    made: ClassVar[list[Net]] = []
+
+    def __init__(self, net: Net) -> None:
+        self.made.append(net)
+
+    def __call__(self, formula: Temporal, limits: Limits) -> Known:
+        assert (formula, limits.deadline.left_seconds) == (parse_temporal("AG EF start"), None)
+        return Known(yes(), "easily")
+
+
+def test_who_judges_formulas_is_made_once_of_a_net_and_has_all_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    Forgets.made.clear()
+    table: dict[Logic, dict[Method, Technique[FormulaDecider]]] = {
+        logic: {Method.ON_THE_FLY: Technique("forgets", f"{__name__}:Forgets")} for logic in Logic
+    }
+    monkeypatch.setattr(settling, "FORMULAS", table)
+    one, verdicts = settling_of("AG EF start", "AG EF start")
+    for verdict in verdicts:
+        one.ask(verdict, (), [[Method.ON_THE_FLY]], NEVER, None)
+    assert {one.found[verdict.name].method for verdict in verdicts} == {"easily"}
+    assert Forgets.made == [NET]
+
+
+def test_runs_are_followed_for_formulas_of_ltl_as_far_as_is_allowed() -> None:
+    one, _ = settling_of("ltl F start", "ltl G F robot.grasp_cv1", "AF start", "ltl G (robot.free -> F mc.machining)")
+    one.follow_runs(NEVER, 3)
+    assert one.found.keys() == {"query.q0"}
+    one.follow_runs(Deadline.after(0), 1_000)
+    assert one.found.keys() == {"query.q0"}
+    one.follow_runs(NEVER, 1_000)
+    assert one.found.keys() == {"query.q0", "query.q1", "query.q3"}
+    assert {verdict.method for verdict in one.found.values()} == {"on the fly"}

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
+from math import inf
 from typing import Any, cast
 
 import pytest
 
 from firable.analysis._engine import BudgetExceeded
 from firable.analysis.deadline import NEVER, Deadline
-from firable.analysis.question import Answer, Question, unknown
+from firable.analysis.question import Answer, Question, unknown, yes
 from firable.analysis.report import _in_turn
+from firable.analysis.spaces.reachability import explore
 from firable.analysis.spaces.space import StateSpace
 from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.nets.catalogue import family_net
-from firable.nets.verdict import Cost, Status, Verdict
+from firable.nets.formula import Holds
+from firable.nets.verdict import Cost, Status, Verdict, Witness
 from firable.semantics.trace import Discipline
 
 
@@ -28,13 +31,14 @@ class Turns:
     deadline: Deadline
     complete: bool = True
     share: float = 1.0
+    most_seconds: float = inf
     asked: list[tuple[str, float]] = field(default_factory=list)
 
     @contextmanager
-    def turn(self, share: float) -> Iterator[None]:
-        self.share = share
+    def turn(self, share: float, most_seconds: float = inf) -> Iterator[None]:
+        self.share, self.most_seconds = share, most_seconds
         yield
-        self.share = 1.0
+        self.share, self.most_seconds = 1.0, inf
 
     def ask(self, name: str, needs: float) -> Verdict:
         """Decided with so large a part of the time."""
@@ -43,9 +47,9 @@ class Turns:
         return Question(name, name).settle(answer, "", Discipline.INTERLEAVING, Cost())
 
 
-def decided(turns: Turns, **needs: float) -> dict[str, bool]:
+def decided(turns: Turns, *, stated: bool = False, **needs: float) -> dict[str, bool]:
     asks = [partial(turns.ask, name, part) for name, part in needs.items()]
-    verdicts = _in_turn(cast(StateSpace[Any], turns), asks)
+    verdicts = _in_turn(cast(StateSpace[Any], turns), *(([], asks) if stated else (asks, [])), {})
     assert [verdict.name for verdict in verdicts] == list(needs)
     return {verdict.name: verdict.status is Status.PROVED for verdict in verdicts}
 
@@ -60,6 +64,50 @@ def test_what_takes_long_is_asked_again_when_all_others_have_been() -> None:
     # What is left then is shared out, and a part of it stays for other techniques.
     assert [share for _, share in again] == pytest.approx([1 / 3, 1 / 2])
     assert decided(Turns(Deadline.after(3600)), long=0.45, short=0.1) == {"long": True, "short": True}
+
+
+def test_what_is_stated_shares_the_time_evenly() -> None:
+    turns = Turns(Deadline.after(3600))
+    assert decided(turns, stated=True, a=0.24, b=0.24, c=0.3, d=0.41) == {"a": True, "b": True, "c": True, "d": True}
+    assert [share for _, share in turns.asked] == pytest.approx([1 / 4, 1 / 3, 0.4, 0.4, 1 / 2])
+
+
+def test_what_is_known_is_shown_in_the_end_where_that_does_not_take_long() -> None:
+    turns = Turns(NEVER)
+    known = Question("of", "of").settle(yes(), "known", Discipline.INTERLEAVING, Cost())
+    run = Witness(marking=("p",))
+    shown = Question("of", "of").settle(yes(run), "shown", Discipline.INTERLEAVING, Cost())
+    seconds: list[float] = []
+
+    def show(verdict: Verdict) -> Verdict:
+        seconds.append(turns.most_seconds)
+        return verdict
+
+    for verdict, method in ((shown, "shown"), (known, "known"), (replace(shown, witness=None), "known")):
+        verdicts = _in_turn(cast(StateSpace[Any], turns), [], [lambda: known], {"of": partial(show, verdict)})
+        assert [verdict.method for verdict in verdicts] == [method]
+    assert len(seconds) == 3
+    assert max(seconds) < 60
+    partly = cast(StateSpace[Any], Turns(NEVER, complete=False))
+    assert _in_turn(partly, [], [lambda: known], {"of": partial(show, shown)}) == (known,)
+
+
+def test_a_turn_on_a_graph_ends_what_passes_over_all_markings_and_leaves_the_rest(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("firable.analysis.spaces.columns.PART", 1 << 12)
+    graph = explore(family_net("machines-17"))
+    with pytest.raises(BudgetExceeded), graph.turn(1.0, 0.0):
+        graph.backward(graph.deadlocks)
+    with pytest.raises(BudgetExceeded), graph.turn(1.0, 0.0):
+        graph.satisfying(Holds(graph.net.places[0].name))
+    with graph.turn(1.0), pytest.raises(BudgetExceeded), graph.turn(1.0, 0.0):
+        graph.backward(graph.deadlocks)
+    assert not graph.count(graph.backward(graph.deadlocks))
+    timed = graph.until(Deadline.after(3600))
+    with timed.turn(0.25) as outer, timed.turn(0.5) as inner, timed.turn(0.5, 10.0) as short:
+        left = [turn.left_seconds for turn in (outer, inner, short)]
+    assert left == [pytest.approx(of, abs=30) for of in (900, 450, 10)]
 
 
 @pytest.mark.parametrize("turns", [Turns(NEVER), Turns(Deadline.after(3600), complete=False), Turns(Deadline.after(0))])

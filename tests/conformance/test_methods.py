@@ -77,7 +77,7 @@ def test_a_technique_decides_formulas_as_the_oracle_does(
     drawn = ltl_formulas if logic is Logic.LTL else ctl_formulas
     formula = data.draw(drawn([place.name for place in net.places], [t.name for t in net.transitions]))
     try:
-        found = FORMULAS[logic][method].load()(net, formula, limits())
+        found = FORMULAS[logic][method].load()(net)(formula, limits())
     except IncompleteGraph:
         return
     query = Query("q", QueryKind(logic), formula)
