@@ -18,6 +18,7 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
+from firable.analysis.deadline import Deadline
 from firable.analysis.goal import Finding
 from firable.analysis.question import Answer, Question
 from firable.analysis.spaces.reachability import BudgetExceeded, IncompleteGraph, ReachabilityGraph
@@ -191,8 +192,7 @@ def _in_turn(
     """What is answered, in the order of the questions; of what is known, what `shows` it, where there is time."""
     asks, verdicts = [*on_the_net, *stated], []
     for later, ask in zip(range(len(asks), 0, -1), asks, strict=True):
-        # Of what is stated one is as good as another, while of the net it is one fixed point that takes the time.
-        with space.turn(_TURN_SHARE if later > len(stated) else min(_TURN_SHARE, 1 / later)):
+        with space.turn(_TURN_SHARE if later > len(stated) else _even_share(space.deadline, later)):
             verdicts.append(ask())
     if not space.complete:
         return tuple(verdicts)
@@ -210,6 +210,15 @@ def _in_turn(
     return tuple(verdicts)
 
 
+def _even_share(deadline: Deadline, later: int) -> float:
+    """The part of the time of a verdict on what is stated: one is as good as another, and many may be too many.
+
+    Of the net, it is one fixed point that takes the time of all.
+    """
+    left = deadline.left_seconds or 0.0
+    return min(_TURN_SHARE, max(1 / later, _TURN_SECONDS_MIN / left)) if left else _TURN_SHARE
+
+
 def _shows(
     space: StateSpace[Any], queries: Sequence[Query], known: Mapping[str, Verdict]
 ) -> dict[str, Callable[[], Verdict]]:
@@ -224,6 +233,8 @@ _SHOWING_SECONDS_MAX: Final = 5.0
 """How long a run is looked for that shows a verdict which is known."""
 _TURN_SHARE: Final = 0.4
 """The part of the time left that one verdict may take before the others have been asked for."""
+_TURN_SECONDS_MIN: Final = 1.0
+"""How long one on what is stated may take even if all cannot: with less, none would come to its end."""
 _FIGURE_SHARE: Final = 0.1
 """The same of a figure, most of which are known from the verdicts."""
 _NOTEBOOK_WIDTH_PIXELS: Final = 900

@@ -307,9 +307,10 @@ class ReachabilityGraph(Derived["Column"]):
 
         With `by`, by edges that fire one of these transitions.
         """
-        inside = None if within is None else within.tobytes()
-        bitmap = self.engine.backward(targets.tobytes(), inside, None if by is None else list(by), **self._limits)
-        return _column(bitmap)
+        if targets.all():
+            return targets.copy()
+        transitions = None if by is None else list(by)
+        return _column(self.engine.backward(targets.tobytes(), _part(within), transitions, **self._limits))
 
     def forward(self, sources: Column) -> Column:
         """The markings that can be reached from one of some, those included."""
@@ -328,7 +329,7 @@ class ReachabilityGraph(Derived["Column"]):
 
     def endless(self, within: Column | None = None) -> Column:
         """The markings from which a run can go on for ever inside `within` (EG over infinite runs only)."""
-        return _column(self.engine.endless(None if within is None else within.tobytes(), **self._limits))
+        return _column(self.engine.endless(_part(within), **self._limits))
 
     def bottom(self) -> Column:
         """The markings of the bottom component that is nearest to M0."""
@@ -466,3 +467,8 @@ def _column(bitmap: bytes) -> Column:
     from firable.analysis.spaces.columns import column
 
     return column(bitmap)
+
+
+def _part(within: Column | None) -> bytes | None:
+    """Some markings as the engine takes them: where they are all, none of them need be looked up."""
+    return None if within is None or within.all() else within.tobytes()

@@ -101,7 +101,7 @@ fn main() {
             "bottoms" => drop(Bottoms::new(&space, &mut watch).expect("fits")),
             "edges" => drop(Csr::new(&space, None, &space.memory.clone(), &mut watch).expect("fits")),
             "backward" => drop(backward(&space, &initial, None, None, &Against::default(), &mut watch).expect("fits")),
-            "endless" => drop(endless(&space, Some(&initial), &mut watch).expect("fits")),
+            "endless" => drop(endless(&space, Some(&initial), &Against::default(), &mut watch).expect("fits")),
             other => panic!("no work {other}"),
         }
         found = (space.len(), space.edges);

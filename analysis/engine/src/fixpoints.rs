@@ -41,6 +41,8 @@ pub struct Against {
     edges: OnceLock<Option<Csr>>,
     /// The components; none where they do not fit.
     condensed: OnceLock<Option<Condensed>>,
+    /// How many edges leave each marking; none where that does not fit.
+    leaving: OnceLock<Option<Vec<u32>>>,
 }
 
 impl Against {
@@ -66,6 +68,24 @@ impl Against {
             keep(&self.condensed, condensed, Condensed::bytes, space)?;
         }
         Ok(self.condensed.get().and_then(Option::as_ref))
+    }
+
+    /// Counts the edges that leave each marking, under interleaving.
+    fn count_leaving(&self, space: &Space, counts: &mut [u32], watch: &mut Watch<'_>) -> Result<(), Stop> {
+        if let Some(Some(known)) = self.leaving.get() {
+            counts.copy_from_slice(known);
+            return Ok(());
+        }
+        with_width!(space.net.words, width => {
+            let mut fan = Fan::forward(space, watch)?;
+            for first in (0..space.len()).step_by(64) {
+                let end = space.len().min(first + 64);
+                fan.load_range(width, first, end);
+                fan.count(&mut counts[first..end]);
+                watch.tick(64 + space.net.transitions.len())?;
+            }
+        });
+        keep(&self.leaving, Ok(counts.to_vec()), |known| size_of_val(known.as_slice()), space)
     }
 
     /// Whether more was tried than it costs to store the edges.
@@ -104,8 +124,8 @@ fn keep<T>(
 }
 
 /// As many candidates for each edge of the graph are tried at most before edges are stored, which costs as much as some
-/// three.
-const WORTH: u64 = 6;
+/// two.
+const WORTH: u64 = 2;
 /// As often as stored edges must fit into the memory that is left: twice while they are turned round, and then beside
 /// those of a question that stores its own.
 const ROOM: usize = 6;
@@ -351,7 +371,14 @@ fn into_many<W: Width>(
 }
 
 /// The markings from which a run can go on for ever inside a set (EG over infinite runs), one byte each.
-pub fn endless(space: &Space, within: Option<&[u8]>, watch: &mut Watch<'_>) -> Result<Vec<u8>, Stop> {
+///
+/// Where most are inside, all edges are counted, and those into the others are taken off like those into what is lost.
+pub fn endless(
+    space: &Space,
+    within: Option<&[u8]>,
+    against: &Against,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<u8>, Stop> {
     let memory = space.memory.clone();
     let count = space.len();
     let mut inside = match within {
@@ -372,8 +399,8 @@ pub fn endless(space: &Space, within: Option<&[u8]>, watch: &mut Watch<'_>) -> R
             }
         }
     };
-    let begin = |inside: &mut [u8], stay: &[u32], agenda: &mut Agenda| {
-        for index in (0..count).filter(|&index| stay[index] == 0 && inside[index] != 0) {
+    let begin = |inside: &mut [u8], stay: &[u32], are_others: bool, agenda: &mut Agenda| {
+        for index in (0..count).filter(|&index| if inside[index] == 0 { are_others } else { stay[index] == 0 }) {
             agenda.add(index);
         }
         for (inside, &stay) in inside.iter_mut().zip(stay) {
@@ -386,7 +413,7 @@ pub fn endless(space: &Space, within: Option<&[u8]>, watch: &mut Watch<'_>) -> R
             *stay = u32::try_from(row[1] - row[0]).map_err(|_| Stop::Memory)?;
         }
         let edges = edges.reversed(&memory, watch)?;
-        begin(&mut inside, &stay, &mut agenda);
+        begin(&mut inside, &stay, false, &mut agenda);
         while agenda.take(&mut taken) {
             for &index in &taken {
                 edges.targets(index).iter().for_each(|&source| lose(&mut inside, &mut stay, &mut agenda, source));
@@ -396,25 +423,37 @@ pub fn endless(space: &Space, within: Option<&[u8]>, watch: &mut Watch<'_>) -> R
         return Ok(inside);
     }
     let transitions = space.net.transitions.len();
+    let are_few_others = 2 * inside.iter().filter(|&&byte| byte == 0).count() < count;
     with_width!(space.net.words, width => {
-        let mut fan = Fan::forward(space, watch)?;
-        for first in (0..count).step_by(64) {
-            let end = count.min(first + 64);
-            fan.load_range(width, first, end);
-            if within.is_none() {
-                fan.count(&mut stay[first..end]);
-            } else {
+        if are_few_others {
+            against.count_leaving(space, &mut stay, watch)?;
+        } else {
+            let mut fan = Fan::forward(space, watch)?;
+            for first in (0..count).step_by(64) {
+                let end = count.min(first + 64);
                 let sources = inside[first..end].iter().rev().fold(0, |bits, &byte| bits << 1 | u64::from(byte));
+                watch.tick(64)?;
+                if sources == 0 {
+                    continue;
+                }
+                fan.load_range(width, first, end);
                 fan.each(width, sources, 0..transitions, &mut |j, _, target| {
                     stay[first + j] += u32::from(inside[target as usize]);
                     false
                 });
+                watch.tick(2 * transitions)?;
             }
-            watch.tick(64 + 2 * transitions)?;
         }
-        begin(&mut inside, &stay, &mut agenda);
+        begin(&mut inside, &stay, are_few_others, &mut agenda);
         let mut fan = Fan::backward(space, watch)?;
         while agenda.take(&mut taken) {
+            if let Some(edges) = against.stored() {
+                for &index in &taken {
+                    edges.targets(index).iter().for_each(|&source| lose(&mut inside, &mut stay, &mut agenda, source));
+                    watch.tick(1 + edges.targets(index).len())?;
+                }
+                continue;
+            }
             fan.load(width, &taken);
             fan.each(width, !0, 0..transitions, &mut |_, _, source| {
                 lose(&mut inside, &mut stay, &mut agenda, source);
@@ -424,4 +463,60 @@ pub fn endless(space: &Space, within: Option<&[u8]>, watch: &mut Watch<'_>) -> R
         }
     });
     Ok(inside)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::unwatched;
+    use crate::samples::random_spaces;
+
+    /// The markings of a set that a run need not leave, by sweeps over all edges.
+    fn staying(edges: &Csr, within: &[u8]) -> Vec<u8> {
+        let mut inside = within.to_vec();
+        loop {
+            let left = |index: usize| edges.targets(index as u32).iter().all(|&target| inside[target as usize] == 0);
+            let lost: Vec<usize> = (0..inside.len()).filter(|&index| inside[index] != 0 && left(index)).collect();
+            if lost.is_empty() {
+                return inside;
+            }
+            lost.iter().for_each(|&index| inside[index] = 0);
+        }
+    }
+
+    #[test]
+    fn a_run_stays_where_sweeps_say_so_whatever_is_stored_and_however_many_are_inside() {
+        let (mut few, mut many, mut lost, mut stored) = (0, 0, 0, 0);
+        for step in [false, true] {
+            for space in random_spaces(200, step) {
+                let mut poll = unwatched;
+                let mut watch = Watch::new(None, &mut poll);
+                let memory = Memory::new(1 << 24);
+                let edges = Csr::new(&space, None, &memory, &mut watch).expect("fits");
+                let against = Against::default();
+                for round in 0..2 {
+                    for nth in [1, 2, 3, 5, space.len(), space.len() + 1] {
+                        let others = |index: usize| index.is_multiple_of(nth);
+                        for most in [false, true] {
+                            let within: Vec<u8> = (1..=space.len()).map(|at| u8::from(others(at) != most)).collect();
+                            let expected = staying(&edges, &within);
+                            let found = endless(&space, Some(&within), &against, &mut watch);
+                            assert_eq!(found.as_ref(), Ok(&expected));
+                            let inside = within.iter().filter(|&&byte| byte != 0).count();
+                            *(if 2 * inside > space.len() { &mut many } else { &mut few }) += 1;
+                            lost += usize::from(expected != within);
+                        }
+                    }
+                    let all = vec![1; space.len()];
+                    assert_eq!(endless(&space, None, &against, &mut watch), Ok(staying(&edges, &all)));
+                    if round == 0 && !step {
+                        against.tried.store(u64::MAX, Ordering::Relaxed);
+                        against.edges(&space, &mut watch).expect("fits");
+                        stored += usize::from(against.stored().is_some());
+                    }
+                }
+            }
+        }
+        assert!(few > 1_000 && many > 1_000 && lost > 1_000 && stored > 100, "{few} {many} {lost} {stored}");
+    }
 }

@@ -396,7 +396,8 @@ impl Graph {
         let patience = Patience::new(max_seconds, cancelled)?;
         self.whole("that a run can go on for ever")?;
         let within = within.map(|within| self.bitmap(within)).transpose()?;
-        let found = self.long(py, &patience, |space, watch| fixpoints::endless(space, within.as_deref(), watch))?;
+        let found = self
+            .long(py, &patience, |space, watch| fixpoints::endless(space, within.as_deref(), &self.against, watch))?;
         Ok(PyBytes::new(py, &found))
     }
 
