@@ -492,6 +492,11 @@ class Diagram:
         """The marking in which exactly these places hold a token, if it is reachable."""
     def having(self, markings: MarkingSet, full: list[int], empty: list[int]) -> MarkingSet:
         """The markings of a set in which some places hold a token and others do not."""
+    def greatest(self, markings: MarkingSet, places: list[int]) -> list[int] | None:
+        """The places that hold a token in some marking of the set with most tokens on these; None where it is empty.
+
+        A place that stands twice counts twice.
+        """
     def which(self, markings: MarkingSet, tests: list[tuple[list[int], list[int]]]) -> list[bool]:
         """For each test (`full`, `empty`), whether `having` would find a marking; all in one pass."""
     def counts(self, markings: MarkingSet, tests: list[tuple[list[int], list[int]]]) -> list[int]:

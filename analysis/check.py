@@ -86,8 +86,8 @@ _COUNTING_SHARE: Final = 0.5  # of the time that is left, for all markings witho
 _COUNTING_SECONDS_MAX: Final = 120.0
 _LEARNT_FIRST: Final = frozenset(question.name for question in QUESTIONS)
 _FIRST_LANES: Final = (
-    (Method.REDUCTION, Method.WALK, Method.STATE_EQUATION),
-    (Method.PARIKH,),
+    (Method.REDUCTION, Method.WALK),
+    (Method.STATE_EQUATION, Method.PARIKH),
     *FORMULA_LANES,
 )
 _FIRST_SLICES_SECONDS: Final = (3.0, 10.0)

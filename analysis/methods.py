@@ -25,7 +25,7 @@ if TYPE_CHECKING:  # the command line reads this table for its help, and so load
     from firable.nets.net import Net
     from firable.nets.temporal import Temporal
 
-    GoalDecider = Callable[[Net, Formula, Limits], Finding]
+    GoalDecider = Callable[[Net], Callable[[Formula, Limits], Finding]]
     SpaceMaker = Callable[[Net, Limits], StateSpace[Any]]
     Knower = Callable[[Net], Callable[[Limits], Mapping[str, Known]]]
     FormulaDecider = Callable[[Net], Callable[[Temporal, Limits], Known]]
@@ -114,20 +114,18 @@ Stubborn sets and projections know what those on the reduced net know, and later
 """
 
 GOALS: Final[dict[Method, Technique[GoalDecider]]] = {
-    Method.REDUCTION: Technique(
+    Method.REDUCTION: Anew(
         "stubborn sets and a diagram on the reduced net", "firable.analysis.reduction.deciding:decide_by_reduction"
     ),
-    Method.STATE_EQUATION: Technique(
-        "state equation", "firable.analysis.structure.state_equation:decide_by_state_equation"
-    ),
-    Method.PARIKH: Technique("Parikh vectors", "firable.analysis.structure.parikh:decide_by_parikh"),
-    Method.PROJECTION: Technique("projection", "firable.analysis.projection.refining:decide_by_projection"),
-    Method.BOUNDED: Technique("bounded model checking", "firable.analysis.induction.bounded:decide_by_bounded_search"),
-    Method.K_INDUCTION: Technique("k-induction", "firable.analysis.induction.k_induction:decide_by_k_induction"),
-    Method.PDR: Technique("property-directed reachability", "firable.analysis.induction.pdr:decide_by_pdr"),
-    Method.STUBBORN_SETS: Technique("stubborn sets", "firable.analysis.stubborn:decide_by_stubborn_sets"),
-    Method.WALK: Technique("random walk", "firable.analysis.walk:decide_by_walk"),
-    Method.COMPACT: Technique("compact search", "firable.analysis.compact:decide_by_compact_search"),
+    Method.STATE_EQUATION: Technique("state equation", "firable.analysis.structure.state_equation:StateEquation"),
+    Method.PARIKH: Anew("Parikh vectors", "firable.analysis.structure.parikh:decide_by_parikh"),
+    Method.PROJECTION: Anew("projection", "firable.analysis.projection.refining:decide_by_projection"),
+    Method.BOUNDED: Anew("bounded model checking", "firable.analysis.induction.bounded:decide_by_bounded_search"),
+    Method.K_INDUCTION: Anew("k-induction", "firable.analysis.induction.k_induction:decide_by_k_induction"),
+    Method.PDR: Anew("property-directed reachability", "firable.analysis.induction.pdr:decide_by_pdr"),
+    Method.STUBBORN_SETS: Anew("stubborn sets", "firable.analysis.stubborn:decide_by_stubborn_sets"),
+    Method.WALK: Anew("random walk", "firable.analysis.walk:decide_by_walk"),
+    Method.COMPACT: Anew("compact search", "firable.analysis.compact:decide_by_compact_search"),
 }
 
 FORMULAS: Final[dict[Logic, dict[Method, Technique[FormulaDecider]]]] = {

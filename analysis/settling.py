@@ -86,6 +86,7 @@ class Settling:
     """What was decided elsewhere."""
     _met: dict[Formula, Finding] = field(default_factory=dict)
     """The goals that are decided: several verdicts may come down to one, and a verdict to several."""
+    _deciders: dict[Method, Callable[[Formula, Limits], Finding]] = field(default_factory=dict)
     _walked: set[Formula] = field(default_factory=set)
     _judges: dict[tuple[Logic, Method], Callable[[Temporal, Limits], Known]] = field(default_factory=dict)
 
@@ -317,7 +318,7 @@ class Settling:
         if deadline.over:
             return None
         contestants = [
-            [Contestant(GOALS[of].words, partial(_decided, of, self.net, goal.formula)) for of in lane if of in GOALS]
+            [Contestant(GOALS[of].words, partial(self._decided, of, goal.formula)) for of in lane if of in GOALS]
             for lane in lanes
         ]
         if not any(contestants):
@@ -330,6 +331,17 @@ class Settling:
         if finding is not None:
             self._met[goal.formula] = finding
         return finding
+
+    def _decided(self, of: Method, goal: Formula, limits: Limits) -> Finding | None:
+        """What a technique found, which keeps what it knows of the net for the next goal."""
+        if of not in self._deciders:
+            self._deciders[of] = GOALS[of].load()(self.net)
+        found = self._deciders[of](goal, limits)
+        if found.reachable is None:
+            raise IncompleteGraph(found.bound or "not decided")
+        if found.reachable:
+            _marking_of(self.net, goal, found)
+        return found
 
     def _nearby(self, name: str, goal: Formula, limits: Limits) -> Finding | None:
         """A goal that a short walk meets, when it is first asked: most that are met at all are met within it."""
@@ -386,13 +398,3 @@ def _marking_of(net: Net, formula: Formula, found: Finding) -> int:
     if not evaluate(BOOL, net, formula, holds_in(marking)):
         raise WitnessError(f"{found.method} shows a marking that does not satisfy the goal")
     return marking
-
-
-def _decided(of: Method, net: Net, formula: Formula, limits: Limits) -> Finding | None:
-    """What a technique found, or None where it did not decide."""
-    found = GOALS[of].load()(net, formula, limits)
-    if found.reachable is None:
-        raise IncompleteGraph(found.bound or "not decided")
-    if found.reachable:
-        _marking_of(net, formula, found)
-    return found

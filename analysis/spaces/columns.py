@@ -16,6 +16,8 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from firable.analysis._engine import BudgetExceeded
+from firable.analysis.deadline import Deadline
 from firable.semantics.algebra import Bitwise
 
 Column = npt.NDArray[np.bool_]
@@ -135,6 +137,22 @@ def first(markings: Column) -> int | None:
     """The lowest marking of a set, which is one nearest to M0; None where the set is empty."""
     index = int(np.argmax(markings)) if len(markings) else 0
     return index if len(markings) and markings[index] else None
+
+
+def fullest(held: Places, places: Sequence[int], n_markings: int, deadline: Deadline) -> tuple[int, Column]:
+    """The greatest number of tokens on places together, and the markings with as many.
+
+    Raises `BudgetExceeded` where the deadline comes first.
+    """
+    tokens = np.zeros(n_markings, np.int64)
+    for start in range(0, n_markings, PART):
+        if start and deadline.over:
+            raise BudgetExceeded("the time was over")
+        part, reader = tokens[start : start + PART], held.reader(start)
+        for place in places:
+            part += unpacked(reader(place))[: len(part)]
+    most = int(tokens.max())
+    return most, tokens == most
 
 
 def some(markings: Column) -> int:

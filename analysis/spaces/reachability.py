@@ -250,6 +250,16 @@ class ReachabilityGraph(Derived["Column"]):
             part[:] = found[: len(part)] if found.ndim else found
         return result
 
+    def fullest(self, places: Sequence[int]) -> tuple[int, Column]:
+        """The greatest number of tokens on places together, and the markings with as many; one pass over all markings.
+
+        Raises `IncompleteGraph`, `BudgetExceeded`.
+        """
+        from firable.analysis.spaces.columns import fullest
+
+        self.require_complete()
+        return fullest(self._places, places, self.n_markings, self._moment)
+
     def some_may_fire(self, some: Iterable[int]) -> Column:
         """The markings in which one of some transitions may fire, in one pass over all markings."""
         openable = [t for t in some if self.net.transitions[t].openable]

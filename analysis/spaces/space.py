@@ -120,6 +120,13 @@ class StateSpace(Protocol[S]):
         """Raise `IncompleteGraph` unless every reachable marking is known."""
         ...
 
+    def fullest(self, places: Sequence[int]) -> tuple[int, S]:
+        """The greatest number of tokens on places together, and markings with as many, at least one of them.
+
+        Places by index; one that stands twice counts twice. Raises `IncompleteGraph` where the space is not whole.
+        """
+        ...
+
     def where(self, term: Callable[[BooleanAlgebra[Any], Valuation[Any]], Any]) -> S:
         """The markings in which a Boolean term holds; `term` gets the algebra and the reader of places."""
         ...

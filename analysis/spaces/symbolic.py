@@ -178,6 +178,12 @@ class SymbolicSpace(Derived[MarkingSet]):
         """Whether a marking is in a set; False for one that is not reachable."""
         return markings.contains([i for i in range(len(self.net.places)) if marking >> i & 1])
 
+    def fullest(self, places: Sequence[int]) -> tuple[int, MarkingSet]:
+        """The greatest number of tokens on places together, and a marking with as many; one pass over the diagram."""
+        marked = self.engine.greatest(self.reach, list(places)) or []
+        full = set(marked)
+        return sum(place in full for place in places), self.engine.single(marked)
+
     def count(self, markings: MarkingSet) -> int:
         """How many markings a set holds, exactly."""
         return markings.count()

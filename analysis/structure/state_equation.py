@@ -19,13 +19,14 @@ invariants an engineer would name.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from time import perf_counter
 
 import z3
 
-from firable.analysis.deadline import Deadline
+from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.certificate import Clause, Equation, InductiveInvariant
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.structure.asking import answer, solver_of
@@ -33,7 +34,7 @@ from firable.analysis.structure.cover import UnitSearch
 from firable.analysis.structure.inequalities import AtLeast, Refuter, kept_by_all, never_more
 from firable.analysis.structure.invariants import columns
 from firable.analysis.structure.ordinary import markable, ordinary
-from firable.analysis.structure.siphons import trap_rules
+from firable.analysis.structure.siphons import Rules, trap_rules
 from firable.nets.formula import Formula
 from firable.nets.net import Net
 from firable.nets.verdict import Cost
@@ -83,61 +84,104 @@ def decide_by_state_equation(net: Net, goal: Formula, limits: Limits) -> Finding
     >>> decide_by_state_equation(net, both, Limits()).reachable
     False
     """
-    start, deadline = perf_counter(), limits.deadline
-    constraints, undecided = _refuted(net, goal, deadline)
-    cost = Cost(seconds=perf_counter() - start)
-    if constraints is None:
-        return Finding(None, METHOD, bound=undecided, cost=cost)
-    return Finding(reachable=False, method=METHOD, cost=cost, certificate=constraints.certificate())
+    return StateEquation(net)(goal, limits)
 
 
 _OUT_OF_TIME = "the time was over"
+_LEARNT_MAX = 64
+"""So many inequalities, and as many traps, are kept from one goal to the next."""
 
 
-def _refuted(net: Net, goal: Formula, deadline: Deadline) -> tuple[Constraints | None, str]:
-    """The constraints that exclude the goal; or None, and why it is undecided."""
-    of = ordinary(net)
-    may_be_marked = markable(of)
-    fires = [t for k, t in enumerate(of.transitions) if may_be_marked.issuperset(of.inputs[k])]
-    changes = columns(net)
-    effects = [changes[t] for t in fires]
-    traps = trap_rules(of)
-    known = Constraints(net, tuple(p for p in range(of.n_places) if p not in may_be_marked))
-    # Those of all transitions, so that each holds whatever else is known; with one token, or else with some.
-    covered = set[int]()
-    for tokens_max in (1, None):
-        drains = UnitSearch(changes, of.n_places, of.marked, tokens_max, draining=True)
-        for place in range(of.n_places):
-            if place in covered or place in drains.covered or not (drain := drains.unit(place, deadline=deadline)):
+class StateEquation:
+    """Goals of one net, one after the other: what is found of the net for one of them is kept for all."""
+
+    def __init__(self, net: Net) -> None:
+        self.net = net
+        self._of = ordinary(net)
+        may_be_marked = markable(self._of)
+        self._known = Constraints(net, tuple(p for p in range(self._of.n_places) if p not in may_be_marked))
+        self._changes = columns(net)
+        self._fires = [t for k, t in enumerate(self._of.transitions) if may_be_marked.issuperset(self._of.inputs[k])]
+        self._learnt = Constraints(net, ())
+        self._deadline = NEVER
+        self._covering = self._cover()
+
+    def _cover(self) -> Iterator[None]:
+        """Look for draining sets that cover the net; stops after each, and goes on with one that the deadline ended.
+
+        They are those of all transitions, so that each holds whatever else is known; with one token, or else with some.
+        """
+        of, covered = self._of, set[int]()
+        for tokens_max in (1, None):
+            drains = UnitSearch(self._changes, of.n_places, of.marked, tokens_max, draining=True)
+            for place in range(of.n_places):
+                drain = None
+                while drain is None and place not in covered and place not in drains.covered:
+                    drain = drains.unit(place, deadline=self._deadline)
+                    if drain and drains.lossless([drain])[0]:
+                        self._known.units.append(drain)
+                    elif drain:
+                        tokens = len(of.marked.intersection(drain))
+                        self._known.inequalities.append(never_more(drain, tokens))
+                    yield
+            covered |= drains.covered
+
+    @cached_property
+    def _traps(self) -> Rules:
+        return trap_rules(self._of)
+
+    @cached_property
+    def _refuter(self) -> Refuter:
+        return Refuter([self._changes[t] for t in self._fires], self._of.n_places, self._of.marked)
+
+    def __call__(self, goal: Formula, limits: Limits) -> Finding:
+        """As `decide_by_state_equation`."""
+        start = perf_counter()
+        constraints, undecided = self._refuted(goal, limits.deadline)
+        cost = Cost(seconds=perf_counter() - start)
+        if constraints is None:
+            return Finding(None, METHOD, bound=undecided, cost=cost)
+        certificate = constraints.certificate()
+        return Finding(reachable=False, method=METHOD, cost=cost, certificate=certificate)
+
+    def _refuted(self, goal: Formula, deadline: Deadline) -> tuple[Constraints | None, str]:
+        """The constraints that exclude the goal; or None, and why it is undecided."""
+        self._deadline = deadline
+        for _ in self._covering:
+            if deadline.over:
+                return None, _OUT_OF_TIME
+        of, known, learnt = self._of, self._known, self._learnt
+        inequalities = [*known.inequalities, *learnt.inequalities]
+        search = _Search(
+            self.net, goal, replace(known, units=[*known.units], inequalities=inequalities, traps=[*learnt.traps])
+        )
+        while True:
+            said, full = search.next(deadline)
+            if said == z3.unsat:
+                needed = search.needed()
+                self._learn(needed)
+                return needed, ""
+            if said != z3.sat:
+                return None, _OUT_OF_TIME if deadline.over else "z3 gave up"
+            trap = self._traps.largest(set(range(of.n_places)) - full)
+            if trap & of.marked:
+                search.add_trap(tuple(sorted(self._traps.smallest(trap, of.marked, deadline) or trap)))
                 continue
-            if drains.lossless([drain])[0]:
-                known.units.append(drain)
-            else:
-                known.inequalities.append(never_more(drain, len(of.marked.intersection(drain))))
-        covered |= drains.covered
-    if deadline.over:
-        return None, _OUT_OF_TIME
-    search = _Search(net, goal, known)
-    refuter: Refuter | None = None
-    while True:
-        said, full = search.next(deadline)
-        if said == z3.unsat:
-            return search.needed(), ""
-        if said != z3.sat:
-            return None, _OUT_OF_TIME if deadline.over else "z3 gave up"
-        trap = traps.largest(set(range(of.n_places)) - full)
-        if trap & of.marked:
-            search.add_trap(tuple(sorted(traps.smallest(trap, of.marked, deadline) or trap)))
-            continue
-        refuter = refuter or Refuter(effects, of.n_places, of.marked)
-        part = search.part(full, deadline)
-        found = refuter.inequality(part & full, part - full, deadline)
-        if found is None and len(part) < of.n_places:
-            found = refuter.inequality(full, set(range(of.n_places)) - full, deadline)
-        if found is None:
-            told = "a marking of the goal solves the state equation and marks every trap that is marked at first"
-            return None, _OUT_OF_TIME if deadline.over else told
-        search.add_inequality(found)
+            part = search.part(full, deadline)
+            found = self._refuter.inequality(part & full, part - full, deadline)
+            if found is None and len(part) < of.n_places:
+                found = self._refuter.inequality(full, set(range(of.n_places)) - full, deadline)
+            if found is None:
+                told = "a marking of the goal solves the state equation and marks every trap that is marked at first"
+                return None, _OUT_OF_TIME if deadline.over else told
+            search.add_inequality(found)
+
+    def _learn(self, needed: Constraints) -> None:
+        """What excludes one goal often excludes the next."""
+        known, learnt = set(self._known.inequalities), self._learnt
+        learnt.inequalities += [of for of in needed.inequalities if of not in known and of not in learnt.inequalities]
+        learnt.traps += [trap for trap in needed.traps if trap not in learnt.traps]
+        del learnt.inequalities[:-_LEARNT_MAX], learnt.traps[:-_LEARNT_MAX]
 
 
 class _Algebra:
@@ -177,6 +221,8 @@ class _Search:
             self._assert(z3.PbEq([(self.places[p], 1) for p in unit], known.tokens(unit)), ("unit", k))
         for k, inequality in enumerate(known.inequalities):
             self._assert(self._term(inequality), ("inequality", k))
+        for k, trap in enumerate(known.traps):
+            self._assert(z3.Or([self.places[p] for p in trap]), ("trap", k))
 
     def _assert(self, term: z3.BoolRef, made: tuple[str, int]) -> None:
         name = z3.Bool(f"c{len(self.names)}", self.context)

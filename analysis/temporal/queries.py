@@ -3,8 +3,6 @@
 What each kind means is said in docs/queries.md; that the contact rule keeps every net safe, and what `one_safe` is then
 about, too. An `EF p` or `AG p` over a state formula is decided by the first marking found (`as_goal` hands it to the
 techniques that need no state space at all); everything else needs all markings, and is unknown without them.
-
-A bound is found by halving: whether k tokens can be reached is a state formula.
 """
 
 from __future__ import annotations
@@ -23,7 +21,7 @@ from firable.analysis.temporal.lasso import TooLongError, accepted_run, satisfie
 from firable.analysis.temporal.ltl import refuting
 from firable.analysis.temporal.sets import Sets
 from firable.analysis.temporal.simplifying import simplified
-from firable.nets.formula import Compare, Count, Formula, Not, Sign, format_count
+from firable.nets.formula import Count, Formula, Not, format_count
 from firable.nets.net import TemporalProperty
 from firable.nets.queries import Query, QueryKind, format_query
 from firable.nets.temporal import (
@@ -59,26 +57,6 @@ def as_goal(formula: Temporal | None) -> tuple[Formula, bool] | None:
         case Globally(operand) if isinstance(operand, Formula):
             return Not(operand), False
     return None
-
-
-def upper_bound(space: StateSpace[Any], places: tuple[str, ...]) -> int:
-    """The greatest number of tokens on the places together, in a reachable marking; a place that stands twice is two.
-
-    Raises `IncompleteGraph` where the space is not whole. Cost: one state formula for each halving.
-    """
-    space.require_complete()
-    low, high = 0, len(places)
-    while low < high:
-        middle = (low + high + 1) // 2
-        if space.count(space.satisfying(_at_least(places, middle))):
-            low = middle
-        else:
-            high = middle - 1
-    return low
-
-
-def _at_least(places: tuple[str, ...], bound: int) -> Formula:
-    return Compare(Count(places), Sign.AT_LEAST, Count(added=bound))
 
 
 def answer(space: StateSpace[Any], query: Query) -> Verdict:
@@ -235,9 +213,10 @@ def _bounded(space: StateSpace[Any], query: Query) -> Verdict:
     found: list[int] = []
 
     def find() -> Answer:
-        bound = upper_bound(space, query.places)
+        bound, markings = space.fullest([space.net.place_index[place] for place in query.places])
         found.append(bound)
-        return yes(space.witness(space.satisfying(_at_least(query.places, bound)), f"here {counted} = {bound}"))
+        note = f"here {counted} = {bound}"
+        return _decided(space, holds=True, show=lambda hurried: hurried.witness(markings, note))
 
     verdict = question.ask(space, find)
     if not found:

@@ -13,7 +13,6 @@ from firable.analysis.goal import Finding, Limits
 from firable.analysis.spaces.reachability import Budget
 from firable.analysis.spaces.space import WitnessError
 from firable.analysis.stubborn import decide_by_stubborn_sets
-from firable.analysis.temporal.queries import upper_bound
 from firable.analysis.verdicts.bounds import greatest
 from firable.nets.catalogue import catalogue_net
 from firable.nets.catalogue.families import family_net
@@ -35,7 +34,7 @@ def test_a_bound_by_goals_is_that_over_all_markings(data: st.DataObject, net: Ne
 
     found = greatest(net, places, reached)
     assert found is not None
-    assert found[0] == upper_bound(NaiveSpace(net), places)
+    assert found[0] == NaiveSpace(net).fullest([net.place_index[place] for place in places])[0]
     assert len(asked) == len(found[1]) <= len(places).bit_length()
 
 

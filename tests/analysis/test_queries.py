@@ -12,8 +12,9 @@ import firable.analysis.temporal.queries as queries
 from firable.analysis._engine import BudgetExceeded
 from firable.analysis.deadline import Deadline
 from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
+from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.analysis.temporal.automaton import TimeEndedError, TooLargeError, automaton_of
-from firable.analysis.temporal.queries import answer, as_goal, upper_bound
+from firable.analysis.temporal.queries import answer, as_goal
 from firable.analysis.temporal.rewriting import positive
 from firable.analysis.verdicts.goals import goals_of
 from firable.analysis.verdicts.properties import decide_stated
@@ -64,10 +65,15 @@ def test_a_bound_is_found_and_shown() -> None:
 
 @given(ring_nets())
 def test_the_bound_is_the_most_tokens_of_any_marking(net: Net) -> None:
-    space = NaiveSpace(net)
+    graph, diagram = explore(net), explore_symbolically(net)
     for places in all_pairs("ab", "ba", "ab"):
-        counts = (sum(marking >> net.place_index[p] & 1 for p in places) for marking in space.graph)
-        assert upper_bound(explore(net), places) == max(counts)
+        on = [net.place_index[place] for place in places]
+        most, markings = NaiveSpace(net).fullest(on)
+        bound, column = graph.fullest(on)
+        assert (bound, frozenset(graph.marking(int(at)) for at in column.nonzero()[0])) == (most, markings)
+        bound, one = diagram.fullest(on)
+        assert (bound, one.count()) == (most, 1)
+        assert any(diagram.contains(one, marking) for marking in markings)
 
 
 @given(ring_nets(signals=True))

@@ -117,7 +117,7 @@ def asked(query: Query) -> Verdict:
 
 def by_one_technique(monkeypatch: pytest.MonkeyPatch) -> list[list[Method]]:
     GOALS_MET.clear()
-    monkeypatch.setattr(settling, "GOALS", {Method.PDR: Technique("hard work", f"{__name__}:by_hard_work")})
+    monkeypatch.setattr(settling, "GOALS", {Method.PDR: Anew("hard work", f"{__name__}:by_hard_work")})
     return [[Method.PDR]]
 
 

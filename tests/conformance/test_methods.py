@@ -44,7 +44,7 @@ def limits() -> Limits:
 
 
 def decides_as_the_oracle(method: Method, net: Net, goal: Formula) -> None:
-    found = GOALS[method].load()(net, goal, limits())
+    found = GOALS[method].load()(net)(goal, limits())
     if found.reachable is None:
         assert found.bound, "what is not decided says how far was looked"
         return

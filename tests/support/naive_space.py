@@ -5,7 +5,7 @@ Each operation is the textbook's sentence about it. Slow and obvious on purpose:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
@@ -86,6 +86,12 @@ class NaiveSpace(Derived[Markings]):
     def where(self, term: Callable[[BooleanAlgebra[Any], Valuation[Any]], Any]) -> Markings:
         """The markings in which a Boolean term holds."""
         return frozenset(marking for marking in self.graph if term(BOOL, holds_in(marking)))
+
+    def fullest(self, places: Sequence[int]) -> tuple[int, Markings]:
+        """The greatest number of tokens on places together, and the markings with as many."""
+        tokens = {marking: sum(marking >> place & 1 for place in places) for marking in self.graph}
+        most = max(tokens.values())
+        return most, frozenset(marking for marking, count in tokens.items() if count == most)
 
     def satisfying(self, formula: Formula) -> Markings:
         """The markings in which a state formula holds."""

@@ -254,6 +254,12 @@ impl Diagram {
         self.shared.set(py, |space, roots, watch| space.having(roots, set, &full, &empty, watch))
     }
 
+    fn greatest(&self, py: Python<'_>, markings: &MarkingSet, places: Vec<u32>) -> PyResult<Option<Vec<u32>>> {
+        let set = self.mine(markings)?;
+        self.places(&places)?;
+        self.shared.work(py, |space, _, watch| space.greatest(set, &places, watch))
+    }
+
     fn which(&self, py: Python<'_>, markings: &MarkingSet, tests: Vec<(Vec<u32>, Vec<u32>)>) -> PyResult<Vec<bool>> {
         let set = self.mine(markings)?;
         self.tested(&tests)?;

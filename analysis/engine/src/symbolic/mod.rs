@@ -6,7 +6,7 @@
 //! as lists of literals (`events`), reachability by saturation (`saturation`, `firing`), which takes several places at
 //! once (`blocks`, `values`, `parts`), on a net whose places were merged (`merging`, `trial`) and are told apart in what
 //! is found (`standing`, `exploring`), one step of all transitions (`image`), runs that go on for ever (`endless`), exact
-//! numbers (`count`, `passing`), firing sequences (`walk`, `layerwise`, `blockwise`), sets as rows for others to read
+//! numbers (`count`, `passing`), the fullest markings (`greatest`), firing sequences (`walk`, `layerwise`, `blockwise`), sets as rows for others to read
 //! (`listing`), and what is found of a net as one value (`space`, `ordered`).
 //!
 //! Everything is written with stacks of its own, because nets have half a million levels, and everything that grows
@@ -24,6 +24,7 @@ mod endless;
 pub mod events;
 mod exploring;
 mod firing;
+mod greatest;
 mod hubs;
 pub mod image;
 mod layerwise;

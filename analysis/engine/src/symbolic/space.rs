@@ -8,6 +8,7 @@ use super::blocks::Blocks;
 use super::cache::ANY;
 use super::count::{self, Natural};
 use super::events::{Suffix, Table};
+use super::greatest::greatest;
 use super::image::{All, image};
 pub use super::ordered::Events;
 use super::ordered::Ordered;
@@ -239,10 +240,21 @@ impl Symbolic {
 
     /// The places of some marking of a set, ascending.
     pub fn any(&self, set: Node) -> Option<Vec<u32>> {
-        let levels = self.ordered.diagram.any(set)?;
+        self.ordered.diagram.any(set).map(|levels| self.places_at(levels))
+    }
+
+    fn places_at(&self, levels: Vec<u32>) -> Vec<u32> {
         let mut places: Vec<u32> = levels.into_iter().map(|level| self.ordered.place_at[level as usize]).collect();
         places.sort_unstable();
-        Some(places)
+        places
+    }
+
+    /// The places of a marking of a set with most tokens on some places, ascending; one that stands twice counts twice.
+    pub fn greatest(&self, set: Node, on: &[u32], watch: &mut Watch<'_>) -> Result<Option<Vec<u32>>, Stop> {
+        let mut weights = vec![0; self.ordered.place_at.len()];
+        on.iter().for_each(|&place| weights[self.ordered.level_of[place as usize] as usize] += 1);
+        let levels = greatest(&self.ordered.diagram, set, &weights, watch)?;
+        Ok(levels.map(|levels| self.places_at(levels)))
     }
 
     /// The closure of a set under the firings, or backwards under their reverses, within a set (`ANY`: all markings).
