@@ -317,7 +317,7 @@ class ReachabilityGraph(Derived["Column"]):
 
         With `by`, by edges that fire one of these transitions.
         """
-        if targets.all():
+        if self.complete and targets.all() and not self._moment.over:
             return targets.copy()
         transitions = None if by is None else list(by)
         return _column(self.engine.backward(targets.tobytes(), _part(within), transitions, **self._limits))

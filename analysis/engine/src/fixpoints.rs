@@ -74,7 +74,7 @@ impl Against {
     fn count_leaving(&self, space: &Space, counts: &mut [u32], watch: &mut Watch<'_>) -> Result<(), Stop> {
         if let Some(Some(known)) = self.leaving.get() {
             counts.copy_from_slice(known);
-            return Ok(());
+            return watch.tick(counts.len());
         }
         with_width!(space.net.words, width => {
             let mut fan = Fan::forward(space, watch)?;
