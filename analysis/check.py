@@ -6,7 +6,8 @@
    a moment and gives the shortest witnesses. What it finds whole is reported the same way every time.
 2. *Hold all markings* by whichever of the explicit engine and the decision diagram is first, side by side. Beside
    both, after a moment, quick techniques begin with the third stage, because how large the space is cannot be seen
-   beforehand. The moment is for nets that are done within it: solvers take longer to load.
+   beforehand. The moment is for nets that are done within it: solvers take longer to load. Where nothing else is asked
+   than formulas, and these settle all of them, the search for all markings ends.
 3. *Settle the verdicts one by one* (`firable.analysis.settling`), where no technique could hold all markings: by
    techniques that know some at once, by a race of techniques for those that come down to goals, and by what follows.
    Where it was room that the explicit engine wanted for, a compact search tries to see all markings without a graph.
@@ -85,12 +86,10 @@ _SEEN_SHARE: Final = 0.25  # of the time that is left, for what the markings say
 _COUNTING_SHARE: Final = 0.5  # of the time that is left, for all markings without a graph
 _COUNTING_SECONDS_MAX: Final = 120.0
 _LEARNT_FIRST: Final = frozenset(question.name for question in QUESTIONS)
-_FIRST_LANES: Final = (
-    (Method.REDUCTION, Method.WALK),
-    (Method.STATE_EQUATION, Method.PARIKH),
-    *FORMULA_LANES,
-)
+_DEADLOCK_LANES: Final = ((Method.REDUCTION, Method.WALK, Method.STATE_EQUATION), (Method.PARIKH,))
+_FIRST_LANES: Final = ((Method.REDUCTION, Method.WALK), (Method.STATE_EQUATION, Method.PARIKH), *FORMULA_LANES)
 _FIRST_SLICES_SECONDS: Final = (3.0, 10.0)
+_STATED_SHARE: Final = 0.3  # of the time, for what is stated and easy, and then for deadlocks where more is stated
 _FORMULAS_SHARE: Final = 0.25  # of the time that is left, for formulas without sets of markings
 _FORMULA_SECONDS_MAX: Final = 1.0  # for each of them
 
@@ -231,13 +230,18 @@ class _Check:
         """
         if enough.wait(_ALONE_SECONDS):
             return
-        for of, share in FIRST_KNOWERS.items() if self.of_the_net else ():
-            settling.learn(of, _LEARNT_FIRST, _moment(deadline, share))
-        asked = [*([DEADLOCK_FREE] if self.of_the_net else []), *map(temporal_question, self._temporal)]
-        asked += [question_of(query) for query in self.queries]
-        settling.ask_in_turns(map(_asked_of, asked), (), _FIRST_LANES, deadline, _FIRST_SLICES_SECONDS)
+        questions = [*map(temporal_question, self._temporal), *map(question_of, self.queries)]
+        asked = list(map(_asked_of, questions))
+        if self.of_the_net:
+            share = deadline.share(_STATED_SHARE)
+            settling.ask_in_turns(asked, (), _FIRST_LANES, share, _FIRST_SLICES_SECONDS, once=True)
+            for of, part in FIRST_KNOWERS.items():
+                settling.learn(of, _LEARNT_FIRST, _moment(deadline, part))
+            share = deadline.share(_STATED_SHARE if asked else 1.0)
+            settling.ask(_asked_of(DEADLOCK_FREE), (), _DEADLOCK_LANES, share, _FIRST_SLICES_SECONDS)
+        settling.ask_in_turns(asked, (), _FIRST_LANES, deadline, _FIRST_SLICES_SECONDS)
         is_all = not self.of_the_net and len(self._temporal) == len(self.net.properties)
-        if is_all and all(question.name in settling.found for question in asked):
+        if is_all and all(verdict.name in settling.found for verdict in asked):
             enough.set()
 
     @property

@@ -17,6 +17,7 @@ import lasting
 import linking
 import protocols
 import public_nets
+import public_queries
 import reacting
 import reading
 import splitting
@@ -32,6 +33,7 @@ BENCHMARKS: Final = {
     "protocols": protocols.tables,
     "linking": linking.tables,
     "public_nets": public_nets.tables,
+    "public_queries": public_queries.tables,
     "executing": executing.tables,
     "reacting": reacting.tables,
     "lasting": lasting.tables,

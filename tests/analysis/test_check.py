@@ -267,7 +267,7 @@ def test_an_unknown_verdict_says_how_far_the_budget_led_and_not_where_the_race_b
 def test_what_the_explicit_engine_has_found_is_kept_where_its_budget_ends(monkeypatch: pytest.MonkeyPatch) -> None:
     """A violation is one whatever markings are left, and nothing is proved by some of them."""
     monkeypatch.setattr(module, "SPACES", {})
-    for lanes in ("GOAL_LANES", "FORMULA_LANES", "_FIRST_LANES"):
+    for lanes in ("GOAL_LANES", "FORMULA_LANES", "_FIRST_LANES", "_DEADLOCK_LANES"):
         monkeypatch.setattr(module, lanes, ())
     monkeypatch.setattr("firable.analysis.settling.Settling.learn", lambda *_: None)
     monkeypatch.setattr(module, "FIRST_MARKINGS", 5)
