@@ -180,8 +180,8 @@ class _Check:
             return self._without_a_graph(error)
         settling = self._settling()
         if first.complete or first.engine.reason == "interrupted":
-            if first.n_markings > FEW_MARKINGS:
-                settling.follow_runs(self.deadline, FOLLOWED_VERTICES)
+            if first.complete and first.n_markings > FEW_MARKINGS:
+                settling.follow_runs(self.deadline.share(_FORMULAS_SHARE), FOLLOWED_VERTICES)
             return self._explored(first, settling.found)
         course = [f"the first {first.n_markings:,} markings are not all"]
         ends: dict[str, ReachabilityGraph] = {}
@@ -241,7 +241,7 @@ class _Check:
             settling.ask(_asked_of(DEADLOCK_FREE), (), _DEADLOCK_LANES, share, _FIRST_SLICES_SECONDS)
         settling.ask_in_turns(asked, (), _FIRST_LANES, deadline, _FIRST_SLICES_SECONDS)
         is_all = not self.of_the_net and len(self._temporal) == len(self.net.properties)
-        if is_all and all(verdict.name in settling.found for verdict in asked):
+        if is_all and asked and all(verdict.name in settling.found for verdict in asked):
             enough.set()
 
     @property

@@ -62,12 +62,12 @@ def race(
     evenly among the lanes. Ctrl-C ends the race, and so does what a technique raises that is no exhausted budget, which
     comes out.
     """
-    course = _Course[T](Event(), Lock())
+    course, lanes = _Course[T](Event(), Lock()), [lane for lane in lanes if lane]
     share = replace(limits, memory_bytes=max(1, limits.memory_bytes // max(1, len(lanes))))
-    ends = [Event() for lane in lanes if lane]
+    ends = [Event() for _ in lanes]
     threads = [
         Thread(target=course.go, args=(lane, share, slices_seconds, end), daemon=True)
-        for lane, end in zip(filter(None, lanes), ends, strict=True)
+        for lane, end in zip(lanes, ends, strict=True)
     ]
     begun: list[Thread] = []
     interrupted = False

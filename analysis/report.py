@@ -22,7 +22,7 @@ from firable.analysis.deadline import Deadline
 from firable.analysis.goal import Finding
 from firable.analysis.question import Answer, Question
 from firable.analysis.spaces.reachability import BudgetExceeded, IncompleteGraph, ReachabilityGraph
-from firable.analysis.spaces.space import StateSpace
+from firable.analysis.spaces.space import StateSpace, WitnessError
 from firable.analysis.temporal.queries import answer, decide_temporal
 from firable.analysis.verdicts import behaviour as behaviour_of
 from firable.analysis.verdicts import conflicts as conflict
@@ -153,8 +153,8 @@ def report_on(
     """Decide every verdict of this room, and the queries, on a state space that was explored before.
 
     Of temporal properties and of queries the verdicts that are `known`, by name, are taken as they are; of a formula
-    that no run shows yet the space is asked for one in the end. The verdicts on the net itself are left out, with their
-    figures, where not `of_the_net`.
+    of CTL that no run shows yet the space is asked for one in the end, and whether it says the same. The verdicts on
+    the net itself are left out, with their figures, where not `of_the_net`. Raises `WitnessError` where it does not.
     """
     behaviour, conflicts = Behaviour(space), ConflictAnalysis(space)
     steps = _steps(space)
@@ -206,6 +206,8 @@ def _in_turn(
     for left, i in zip(range(len(bare), 0, -1), bare, strict=True):
         with space.turn(1 / (left + 1), _SHOWING_SECONDS_MAX):
             shown = shows[verdicts[i].name]()
+        if shown.status not in {verdicts[i].status, Status.UNKNOWN}:
+            raise WitnessError(f"of {shown.name} {shown.method} says {shown.status}, and {verdicts[i].method} does not")
         verdicts[i] = shown if shown.witness is not None else verdicts[i]
     return tuple(verdicts)
 

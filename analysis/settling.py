@@ -92,6 +92,7 @@ class Settling:
     _met: dict[Formula, Finding] = field(default_factory=dict)
     """The goals that are decided: several verdicts may come down to one, and a verdict to several."""
     _deciders: dict[Method, Callable[[Formula, Limits], Finding]] = field(default_factory=dict)
+    _asked: dict[tuple[str, frozenset[str]], tuple[Question, tuple[Goal, ...]] | None] = field(default_factory=dict)
     _walked: set[Formula] = field(default_factory=set)
     _judges: dict[tuple[Logic, Method], Callable[[Temporal, Limits], Known]] = field(default_factory=dict)
 
@@ -147,25 +148,33 @@ class Settling:
 
         `fired` names transitions that are known to fire.
         """
-        if verdict.name in self.found or not lanes:
+        if verdict.name in self.found or not lanes or deadline.over:
             return
-        asked = goals_of(self.net, verdict.name, fired) or query_goals(self.queries, verdict)
+        asked = self._goals_of(verdict, fired)
         if asked is None:
             self._by_formula(verdict, lanes, deadline, slices_seconds)
             return
         if len(asked[1]) > _GOALS_MAX:
             return
         question, goals = asked
-        finding = None
+        finding, findings = None, list[tuple[Formula, Finding]]()
+        self.findings[verdict.name] = findings
         for goal in goals:
             if (finding := self._race(verdict.name, goal, lanes, deadline, slices_seconds)) is None:
                 return
-            self.findings.setdefault(verdict.name, []).append((goal.formula, finding))
+            findings.append((goal.formula, finding))
             if finding.reachable is not goal.wanted:
                 self._settle(question, self._failed(goal, finding), finding.method, finding.cost)
                 return
         if finding is not None:
             self._settle(question, yes(finding.witness), finding.method, finding.cost)
+
+    def _goals_of(self, verdict: Verdict, fired: Collection[str]) -> tuple[Question, tuple[Goal, ...]] | None:
+        """The question of a verdict and its goals, made once: of large nets that takes seconds."""
+        key = verdict.name, frozenset(fired)
+        if key not in self._asked:
+            self._asked[key] = goals_of(self.net, verdict.name, fired) or query_goals(self.queries, verdict)
+        return self._asked[key]
 
     def follow_runs(self, deadline: Deadline, vertices: int) -> None:
         """Settle the formulas of LTL that are decided on the fly at so many vertices; the same ones on every day."""
@@ -179,6 +188,9 @@ class Settling:
                 known = decide_ltl_on_the_fly(self.net, formula, limits, turns=[(None, vertices)])
             except IncompleteGraph:
                 continue
+            except KeyboardInterrupt:
+                self.interrupted.set()
+                return
             self._settle(question, known.answer, known.method, known.cost)
 
     def ask_in_turns(
@@ -199,7 +211,8 @@ class Settling:
         seconds, waiting = _TURN_SECONDS, list(verdicts)
         while waiting:
             left = deadline.left_seconds
-            is_last = len(waiting) == 1 or seconds > (_TURN_SECONDS_MAX if left is None else left / len(waiting))
+            longest = _TURN_SECONDS_MAX if left is None else left / len(waiting)
+            is_last = not once and (len(waiting) == 1 or seconds > longest)
             for later, verdict in zip(range(len(waiting), 0, -1), waiting, strict=True):
                 until = deadline.share(1 / later) if is_last else deadline.within(seconds)
                 self.ask(verdict, fired, lanes, until, slices_seconds)
@@ -356,7 +369,11 @@ class Settling:
         if goal in self._walked or isinstance(goal, Deadlock):
             return None
         self._walked.add(goal)
-        finding = self._walks.decide(goal, limits, firings=_NEARBY_FIRINGS)
+        try:
+            finding = self._walks.decide(goal, limits, firings=_NEARBY_FIRINGS)
+        except KeyboardInterrupt:
+            self.interrupted.set()
+            return None
         if not finding.reachable:
             return None
         self.course.append(f"{name}: a short walk was first")

@@ -144,7 +144,7 @@ def fullest(held: Places, places: Sequence[int], n_markings: int, deadline: Dead
 
     Raises `BudgetExceeded` where the deadline comes first.
     """
-    tokens = np.zeros(n_markings, np.int64)
+    tokens = np.zeros(n_markings, np.uint32)
     for start in range(0, n_markings, PART):
         if start and deadline.over:
             raise BudgetExceeded("the time was over")

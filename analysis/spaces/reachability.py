@@ -154,8 +154,7 @@ class ReachabilityGraph(Derived["Column"]):
     @contextmanager
     def turn(self, share: float, most_seconds: float = inf, /) -> Iterator[Deadline]:
         """Let what passes over all markings meanwhile take at most this part of the time left, and so many seconds."""
-        left = self._moment.left_seconds
-        turn = self._moment.within(most_seconds if left is None else min(most_seconds, left * share))
+        turn = self._moment.share(share).within(most_seconds)
         self._turns.append(turn)
         try:
             yield turn

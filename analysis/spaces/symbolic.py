@@ -71,8 +71,7 @@ class SymbolicSpace(Derived[MarkingSet]):
     def turn(self, share: float, most_seconds: float = inf, /) -> Iterator[Deadline]:
         """Let what is asked meanwhile take at most this part of the time left: one fixpoint may take all of it."""
         outer = self._turns[-1] if self._turns else self.deadline
-        left = outer.left_seconds
-        turn = outer.within(most_seconds if left is None else min(most_seconds, left * share))
+        turn = outer.share(share).within(most_seconds)
         self._turns.append(turn)
         self.engine.limit(**engine_limits(turn))
         try:

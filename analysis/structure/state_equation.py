@@ -137,7 +137,11 @@ class StateEquation:
     def __call__(self, goal: Formula, limits: Limits) -> Finding:
         """As `decide_by_state_equation`."""
         start = perf_counter()
-        constraints, undecided = self._refuted(goal, limits.deadline)
+        try:
+            constraints, undecided = self._refuted(goal, limits.deadline)
+        finally:
+            if limits.deadline.over:  # a solver that was ended may take that for the next question, too
+                self.__dict__.pop("_refuter", None)
         cost = Cost(seconds=perf_counter() - start)
         if constraints is None:
             return Finding(None, METHOD, bound=undecided, cost=cost)

@@ -94,6 +94,7 @@ class _Goals:
 
     net: Net
     findings: dict[Formula, Finding] = field(default_factory=dict)
+    walked: set[Formula] = field(default_factory=set)
 
     @cached_property
     def walks(self) -> Walks:
@@ -105,7 +106,9 @@ class _Goals:
         if goal in self.findings:
             return self.findings[goal]
         walk, reduction = partial(self.walks.decide, firings=_FIRINGS), partial(decide_by_reduction, self.net)
-        for decide in (walk, reduction):
+        deciders = [reduction] if goal in self.walked else [walk, reduction]
+        self.walked.add(goal)
+        for decide in deciders:
             try:
                 finding = decide(goal, limits)
             except (BudgetExceeded, IncompleteGraph):

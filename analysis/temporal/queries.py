@@ -132,7 +132,7 @@ def _answered(space: StateSpace[Any], query: Query) -> Answer:
 def _goal(space: StateSpace[S], goal: Formula, *, holds: bool) -> Answer:
     targets = space.satisfying(goal)
     if space.count(targets):
-        return _decided(space, holds, lambda hurried: hurried.witness(targets, f"here ({format_temporal(goal)}) holds"))
+        return _decided(space, holds, lambda: space.witness(targets, f"here ({format_temporal(goal)}) holds"))
     space.require_complete()
     return no() if holds else yes()
 
@@ -143,22 +143,16 @@ def _ctl(space: StateSpace[S], formula: Temporal) -> Answer:
     simpler = simplified(formula, ctl.sets.constant)
     holds = space.contains(ctl.of(simpler), space.net.initial_marking)
 
-    def show(hurried: StateSpace[S]) -> Witness | None:
-        ctl.sets.space = hurried
-        return shown(ctl, formula) if holds else refuted(ctl, formula)
-
-    return _decided(space, holds, show)
+    return _decided(space, holds, lambda: shown(ctl, formula) if holds else refuted(ctl, formula))
 
 
-def _decided(space: StateSpace[S], holds: bool, show: Callable[[StateSpace[S]], Witness | None]) -> Answer:
+def _decided(space: StateSpace[S], holds: bool, show: Callable[[], Witness | None]) -> Answer:
     """An answer that is known, with what shows it: it must not be lost over the search for that."""
-    deadline, left = space.deadline, space.deadline.left_seconds
     try:
-        return Answer(holds, witness=show(space if left is None else space.until(deadline.within(left * _SHOWN_SHARE))))
+        with space.turn(_SHOWN_SHARE):
+            return Answer(holds, witness=show())
     except BudgetExceeded:
         return Answer(holds, hint="the run that shows it takes too long to be found")
-    finally:
-        space.until(deadline)
 
 
 def _ltl(space: StateSpace[S], formula: Temporal) -> Answer:
@@ -216,7 +210,7 @@ def _bounded(space: StateSpace[Any], query: Query) -> Verdict:
         bound, markings = space.fullest([space.net.place_index[place] for place in query.places])
         found.append(bound)
         note = f"here {counted} = {bound}"
-        return _decided(space, holds=True, show=lambda hurried: hurried.witness(markings, note))
+        return _decided(space, holds=True, show=lambda: space.witness(markings, note))
 
     verdict = question.ask(space, find)
     if not found:

@@ -19,6 +19,7 @@ from firable.analysis.methods import GOALS, KNOWERS, SPACES, Method
 from firable.analysis.race import Contestant, Outcome, race
 from firable.analysis.report import CheckReport, report_on
 from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
+from firable.analysis.spaces.space import WitnessError
 from firable.analysis.spaces.symbolic import SymbolicSpace, explore_symbolically
 from firable.nets.catalogue import catalogue_net
 from firable.nets.catalogue.processes import philosophers
@@ -296,3 +297,60 @@ def test_of_the_net_itself_nothing_is_asked_where_nobody_wants_to_know(
     ]
     assert (part.figures.markings, part.figures.complete) == (whole.figures.markings, True)
     assert (part.figures.live, part.figures.structural_conflicts) == (None, None)
+
+
+@pytest.mark.parametrize("text", ["EF (robot.put_mc and mc.machining)", "AG EF deadlock"])
+def test_where_nothing_is_left_to_ask_the_search_for_all_markings_ends(
+    monkeypatch: pytest.MonkeyPatch, text: str
+) -> None:
+    """It would else go on for as long as it is given; of the net itself, or with another question, it does."""
+    monkeypatch.setattr(module, "FIRST_MARKINGS", 5)
+    monkeypatch.setattr(module, "SPACES", {})
+    begun: list[bool] = []
+
+    def endless(_: Any, __: Any, limits: Limits) -> None:
+        while not limits.deadline.over:
+            sleep(0.01)
+        begun.append(limits.deadline.left_seconds == 0)
+        raise IncompleteGraph("ended")
+
+    monkeypatch.setattr("firable.analysis.check._Check._held_explicitly", endless)
+    net = replace(catalogue_net("one_robot"), properties=())
+    asked = parse_query(text, "asked")
+    found = check(net, queries=[asked], of_the_net=False, budget=Budget(seconds=600)).verdict("query.asked")
+    assert found.status is not Status.UNKNOWN
+    hard = parse_query("AF EG start", "hard")
+    monkeypatch.setattr("firable.analysis.settling.Settling.ask", lambda *_, **__: None)
+    assert (
+        check(net, queries=[hard], of_the_net=False, budget=Budget(seconds=0.5)).verdict("query.hard").status
+        is Status.UNKNOWN
+    )
+    assert begun == [False, True]
+
+
+def test_a_formula_that_is_known_and_bare_is_shown_by_all_markings_which_must_say_the_same() -> None:
+    net = catalogue_net("one_robot_mc_late")
+    query = parse_query("EF EG not start", "q")
+    graph = explore(net)
+    whole = report_on(graph, [query], of_the_net=False).verdict("query.q")
+    assert (whole.status, whole.witness is None) == (Status.PROVED, False)
+    bare = replace(whole, witness=None, method="by hearsay")
+    shown = report_on(graph, [query], {"query.q": bare}, of_the_net=False).verdict("query.q")
+    assert (shown.witness, shown.method) == (whole.witness, whole.method)
+    kept = report_on(graph, [query], {"query.q": replace(whole, method="seen")}, of_the_net=False).verdict("query.q")
+    assert kept.method == "seen"
+    part = explore(net, budget=Budget(5))
+    assert report_on(part, [query], {"query.q": bare}, of_the_net=False).verdict("query.q") == bare
+    wrong = replace(bare, status=Status.VIOLATED)
+    with pytest.raises(WitnessError, match="by hearsay does not"):
+        report_on(graph, [query], {"query.q": wrong}, of_the_net=False)
+
+
+def test_of_many_markings_formulas_of_ltl_are_followed_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    net, query = catalogue_net("one_robot"), parse_query("ltl G F robot.grasp_cv1", "q")
+    assert check(net, queries=[query]).verdict("query.q").method == "reachability graph, interleaving"
+    monkeypatch.setattr(module, "FEW_MARKINGS", 30)
+    followed = check(net, queries=[query])
+    assert followed.verdict("query.q").method == "on the fly"
+    assert check(net, queries=[query], method="explicit").verdict("query.q").method.startswith("reachability graph")
+    assert check(net, queries=[query], budget=Budget(20, seconds=0)).verdict("query.q").method != "on the fly"

@@ -132,6 +132,16 @@ def test_one_that_is_hard_does_not_take_the_time_of_all_others(monkeypatch: pyte
     assert max(turns) > 0.1, "in the last one"
 
 
+@pytest.mark.parametrize("texts", [("EF mc.free",), ("EF mc.free", "AG not mc.free")])
+def test_who_has_one_turn_has_no_more_than_that(monkeypatch: pytest.MonkeyPatch, texts: tuple[str, ...]) -> None:
+    lanes = by_one_technique(monkeypatch)
+    monkeypatch.setattr(settling, "_TURN_SECONDS", 0.1)
+    one, verdicts = settling_of(*texts)
+    one.ask_in_turns(verdicts, (), lanes, Deadline.after(60), once=True)
+    assert max(left for _, left in GOALS_MET if left is not None) <= 0.1
+    assert not one.found
+
+
 def test_without_a_limit_the_last_turn_is_as_long_as_the_techniques_try(monkeypatch: pytest.MonkeyPatch) -> None:
     lanes = by_one_technique(monkeypatch)
     monkeypatch.setattr(settling, "_TURN_SECONDS_MAX", 0.1)
@@ -198,11 +208,20 @@ def test_who_judges_formulas_is_made_once_of_a_net_and_has_all_the_time(monkeypa
     assert Forgets.made == [NET]
 
 
-def test_runs_are_followed_for_formulas_of_ltl_as_far_as_is_allowed() -> None:
+def by_ctrl_c(*_: object, **__: object) -> Known:
+    raise KeyboardInterrupt
+
+
+def test_runs_are_followed_for_formulas_of_ltl_as_far_as_is_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
     one, _ = settling_of("ltl F start", "ltl G F robot.grasp_cv1", "AF start", "ltl G (robot.free -> F mc.machining)")
     one.follow_runs(NEVER, 3)
     assert one.found.keys() == {"query.q0"}
     one.follow_runs(Deadline.after(0), 1_000)
+    assert one.found.keys() == {"query.q0"}
+    with monkeypatch.context() as patch:
+        patch.setattr(settling, "decide_ltl_on_the_fly", by_ctrl_c)
+        one.follow_runs(NEVER, 1_000)
+    assert one.interrupted.is_set(), "by Ctrl-C"
     assert one.found.keys() == {"query.q0"}
     one.follow_runs(NEVER, 1_000)
     assert one.found.keys() == {"query.q0", "query.q1", "query.q3"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from threading import Event
 
 import pytest
@@ -17,26 +18,29 @@ from support.whole_nets import formulas
 from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.certificate import Clause, InductiveInvariant
 from firable.analysis.goal import Limits
-from firable.analysis.structure.state_equation import decide_by_state_equation
-from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not
+from firable.analysis.structure.inequalities import AtLeast, Refuter
+from firable.analysis.structure.state_equation import StateEquation, decide_by_state_equation
+from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, parse_formula
 from firable.nets.net import Net, Place, Transition
 from firable.semantics.player import Player
 
 
 @st.composite
-def nets_with_goals(draw: st.DrawFn) -> tuple[Net, Formula]:
+def nets_with_goals(draw: st.DrawFn) -> tuple[Net, list[Formula]]:
     net = draw(st.one_of(ring_nets(), dense_nets()))
-    goal = draw(formulas([p.name for p in net.places], [t.name for t in net.transitions]))
-    return net, goal
+    drawn = formulas([p.name for p in net.places], [t.name for t in net.transitions])
+    return net, draw(st.lists(drawn, min_size=1, max_size=3))
 
 
 @examples(40)
 @given(nets_with_goals())
 def test_what_is_refuted_is_not_reachable_and_the_certificate_is_an_inductive_invariant(
-    drawn: tuple[Net, Formula],
+    drawn: tuple[Net, list[Formula]],
 ) -> None:
-    net, goal = drawn
-    check_finding(net, goal, decide_by_state_equation(net, goal, Limits()))
+    net, goals = drawn
+    decide = StateEquation(net)
+    for goal in goals:
+        check_finding(net, goal, decide(goal, Limits()))
 
 
 @pytest.mark.parametrize("name", reference_names())
@@ -98,3 +102,38 @@ def test_an_inequality_excludes_what_a_sum_that_only_grows_cannot_come_back_to()
     assert found.reachable is False
     assert isinstance(found.certificate, InductiveInvariant)
     assert found.certificate.inequalities
+
+
+@pytest.mark.parametrize("name", reference_names())
+def test_what_was_learnt_of_one_goal_excludes_nothing_of_another(name: str) -> None:
+    net = load_net(name)
+    decide, reachable = StateEquation(net), Player(net).reachable()
+    goals: list[Formula] = [And((Holds(a.name), Holds(b.name))) for a in net.places[:3] for b in net.places[3:9]]
+    for goal in [*goals, Deadlock(), *map(Not, goals[:3])]:
+        found = decide(goal, Limits())
+        if decide_by_state_equation(net, goal, Limits()).reachable is False:
+            assert found.reachable is False
+        assert found.reachable is None or not any(holds(net, goal, marking) for marking in reachable)
+
+
+def test_who_is_ended_goes_on_where_that_was_and_takes_no_solver_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A solver that is interrupted where it does nothing refuses the next question."""
+    net = load_net("fig2b")
+    goal, decide, flag = parse_formula("c0.Machine and not c0.Task"), StateEquation(net), Event()
+    asked: list[Refuter] = []
+    inequality = Refuter.inequality
+
+    def ended(self: Refuter, full: Iterable[int], empty: Iterable[int], deadline: Deadline) -> AtLeast | None:
+        asked.append(self)
+        found = inequality(self, full, empty, deadline)
+        if len(asked) == 1:
+            flag.set()
+            self.solver.ctx.interrupt()
+        return found if len(asked) > 1 else None
+
+    monkeypatch.setattr(Refuter, "inequality", ended)
+    assert decide(goal, Limits(Deadline(cancelled=flag))).reachable is None
+    assert decide(goal, Limits()).reachable is False
+    assert len(set(map(id, asked))) == 2
+    assert decide(goal, Limits(Deadline.after(0))).reachable is None
+    assert decide(goal, Limits()).reachable is False

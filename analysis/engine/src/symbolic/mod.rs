@@ -6,8 +6,8 @@
 //! as lists of literals (`events`), reachability by saturation (`saturation`, `firing`), which takes several places at
 //! once (`blocks`, `values`, `parts`), on a net whose places were merged (`merging`, `trial`) and are told apart in what
 //! is found (`standing`, `exploring`), one step of all transitions (`image`), runs that go on for ever (`endless`), exact
-//! numbers (`count`, `passing`), the fullest markings (`greatest`), firing sequences (`walk`, `layerwise`, `blockwise`), sets as rows for others to read
-//! (`listing`), and what is found of a net as one value (`space`, `ordered`).
+//! numbers (`count`, `passing`), the fullest markings (`greatest`), firing sequences (`walk`, `layerwise`, `blockwise`),
+//! sets as rows for others to read (`listing`), and what is found of a net as one value (`space`, `ordered`).
 //!
 //! Everything is written with stacks of its own, because nets have half a million levels, and everything that grows
 //! claims its bytes, so that running out of either is a return value. Nodes with several places each, in a store of their
