@@ -89,7 +89,7 @@ _LEARNT_FIRST: Final = frozenset(question.name for question in QUESTIONS)
 _DEADLOCK_LANES: Final = ((Method.REDUCTION, Method.WALK, Method.STATE_EQUATION), (Method.PARIKH,))
 _FIRST_LANES: Final = ((Method.REDUCTION, Method.WALK), (Method.STATE_EQUATION, Method.PARIKH), *FORMULA_LANES)
 _FIRST_SLICES_SECONDS: Final = (3.0, 10.0)
-_STATED_SHARE: Final = 0.3  # of the time, for what is stated and easy, and then for deadlocks where more is stated
+_STATED_SHARE: Final = 0.5  # of the time, for what is stated and easy
 _FORMULAS_SHARE: Final = 0.25  # of the time that is left, for formulas without sets of markings
 _FORMULA_SECONDS_MAX: Final = 1.0  # for each of them
 
@@ -232,14 +232,14 @@ class _Check:
             return
         questions = [*map(temporal_question, self._temporal), *map(question_of, self.queries)]
         asked = list(map(_asked_of, questions))
+        share = deadline.share(_STATED_SHARE)
+        settling.ask_in_turns(asked, (), _FIRST_LANES, share, _FIRST_SLICES_SECONDS, once=True)
+        for of, part in FIRST_KNOWERS.items() if self.of_the_net else ():
+            settling.learn(of, _LEARNT_FIRST, _moment(deadline, part))
+        # What else is hard waits for the processors, which the search for all markings has.
+        settling.ask_in_turns(map(_asked_of, self._formulas()), (), FORMULA_LANES, deadline, _FIRST_SLICES_SECONDS)
         if self.of_the_net:
-            share = deadline.share(_STATED_SHARE)
-            settling.ask_in_turns(asked, (), _FIRST_LANES, share, _FIRST_SLICES_SECONDS, once=True)
-            for of, part in FIRST_KNOWERS.items():
-                settling.learn(of, _LEARNT_FIRST, _moment(deadline, part))
-            share = deadline.share(_STATED_SHARE if asked else 1.0)
-            settling.ask(_asked_of(DEADLOCK_FREE), (), _DEADLOCK_LANES, share, _FIRST_SLICES_SECONDS)
-        settling.ask_in_turns(asked, (), _FIRST_LANES, deadline, _FIRST_SLICES_SECONDS)
+            settling.ask(_asked_of(DEADLOCK_FREE), (), _DEADLOCK_LANES, deadline, _FIRST_SLICES_SECONDS)
         is_all = not self.of_the_net and len(self._temporal) == len(self.net.properties)
         if is_all and asked and all(verdict.name in settling.found for verdict in asked):
             enough.set()
@@ -248,11 +248,15 @@ class _Check:
     def _temporal(self) -> list[TemporalProperty]:
         return [of for of in self.net.properties if isinstance(of, TemporalProperty)]
 
+    def _formulas(self) -> list[Question]:
+        """The formulas that do not come down to goals."""
+        stated = [temporal_question(of) for of in self._temporal if not as_goal(of.formula)]
+        asked = [question_of(query) for query in self.queries if query.formula and not as_goal(query.formula)]
+        return [*stated, *asked]
+
     def _ask_formulas(self, settling: Settling) -> None:
         """Settle the formulas that do not come down to goals, one after the other, as far as that is quick."""
-        asked = [temporal_question(of) for of in self._temporal if not as_goal(of.formula)]
-        asked += [question_of(query) for query in self.queries if query.formula and not as_goal(query.formula)]
-        share = self.deadline.share(_FORMULAS_SHARE)
+        asked, share = self._formulas(), self.deadline.share(_FORMULAS_SHARE)
         for later, question in zip(range(len(asked), 0, -1), asked, strict=True):
             turn = share.share(1 / later).within(_FORMULA_SECONDS_MAX)
             settling.ask(_asked_of(question), (), FORMULA_LANES, turn, None)

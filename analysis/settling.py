@@ -60,6 +60,7 @@ _SAID_BY: Final = {
 }
 _GOALS_MAX: Final = 64  # a verdict of more goals than this takes longer than anybody waits
 _TURN_SECONDS: Final = 0.25  # for each question in the first turn
+_FIRST_TURN: Final = 0.5  # of the time that is left, at most, for the first turn of all
 _TURN_SECONDS_MAX: Final = 30.0  # in the last but one, where no time is given
 _TURN_GROWTH: Final = 4.0
 _NEARBY_FIRINGS: Final = 2**13  # of a walk before the race, some milliseconds
@@ -208,11 +209,12 @@ class Settling:
         Which one is hard cannot be seen beforehand, and one that is would take its time from all others. Where that is
         said, each has one turn.
         """
-        seconds, waiting = _TURN_SECONDS, list(verdicts)
+        waiting, left = list(verdicts), deadline.left_seconds
+        seconds = _TURN_SECONDS if left is None else min(_TURN_SECONDS, _FIRST_TURN * left / max(1, len(waiting)))
         while waiting:
             left = deadline.left_seconds
             longest = _TURN_SECONDS_MAX if left is None else left / len(waiting)
-            is_last = not once and (len(waiting) == 1 or seconds > longest)
+            is_last = not once and (len(waiting) == 1 or seconds >= longest)
             for later, verdict in zip(range(len(waiting), 0, -1), waiting, strict=True):
                 until = deadline.share(1 / later) if is_last else deadline.within(seconds)
                 self.ask(verdict, fired, lanes, until, slices_seconds)
@@ -376,7 +378,7 @@ class Settling:
             return None
         if not finding.reachable:
             return None
-        self.course.append(f"{name}: a short walk was first")
+        self._tell(name, "a short walk was first")
         return finding
 
     @cached_property
@@ -396,10 +398,16 @@ class Settling:
         said = f"{outcome.winner} was first"
         if outcome.answer is None:
             said = "; ".join(outcome.told) or "no technique was asked any more"
-        self.course.append(f"{name}: {said}")
+        self._tell(name, said)
         if outcome.answer is None:
             self.reached[name] = said
         return outcome
+
+    def _tell(self, name: str, said: str) -> None:
+        """Add to the course what came of a question to a verdict, in place of how it was left before."""
+        if (before := self.reached.pop(name, None)) is not None:
+            self.course.remove(f"{name}: {before}")
+        self.course.append(f"{name}: {said}")
 
     def noted(self, outcome: Outcome[T]) -> Outcome[T]:
         """The outcome; where Ctrl-C ended the race nothing else is begun, and what is known is reported."""

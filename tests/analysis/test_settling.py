@@ -130,6 +130,16 @@ def test_one_that_is_hard_does_not_take_the_time_of_all_others(monkeypatch: pyte
     turns = [left for goal, left in GOALS_MET if "mc.free" in str(goal) and left is not None]
     assert max(turns[:2]) <= 0.05, "in the first turn"
     assert max(turns) > 0.1, "in the last one"
+    assert len(turns) > 4
+    assert [line.partition(":")[0] for line in sorted(one.course)] == [verdict.name for verdict in verdicts]
+
+
+def test_where_there_is_no_time_nobody_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    lanes = by_one_technique(monkeypatch)
+    one, verdicts = settling_of("EF mc.free", "AG not mc.free", "EF start")
+    for once in (False, True):
+        one.ask_in_turns(verdicts, (), lanes, Deadline.after(0), once=once)
+    assert not GOALS_MET
 
 
 @pytest.mark.parametrize("texts", [("EF mc.free",), ("EF mc.free", "AG not mc.free")])
