@@ -95,6 +95,7 @@ class Settling:
     _deciders: dict[Method, Callable[[Formula, Limits], Finding]] = field(default_factory=dict)
     _asked: dict[tuple[str, frozenset[str]], tuple[Question, tuple[Goal, ...]] | None] = field(default_factory=dict)
     _walked: set[Formula] = field(default_factory=set)
+    """The goals that a short walk does not meet."""
     _judges: dict[tuple[Logic, Method], Callable[[Temporal, Limits], Known]] = field(default_factory=dict)
 
     def learn(self, of: Method, among: Collection[str], deadline: Deadline) -> None:
@@ -206,8 +207,8 @@ class Settling:
     ) -> None:
         """Settle verdicts, the easy ones first: all are asked in turns that grow, of which the last share out the time.
 
-        Which one is hard cannot be seen beforehand, and one that is would take its time from all others. Where that is
-        said, each has one turn.
+        Which one is hard cannot be seen beforehand, and one that is would take its time from all others. With `once`
+        each has one turn.
         """
         waiting, left = list(verdicts), deadline.left_seconds
         seconds = _TURN_SECONDS if left is None else min(_TURN_SECONDS, _FIRST_TURN * left / max(1, len(waiting)))
@@ -370,13 +371,14 @@ class Settling:
         """A goal that a short walk meets, when it is first asked: most that are met at all are met within it."""
         if goal in self._walked or isinstance(goal, Deadlock):
             return None
-        self._walked.add(goal)
         try:
             finding = self._walks.decide(goal, limits, firings=_NEARBY_FIRINGS)
         except KeyboardInterrupt:
             self.interrupted.set()
             return None
         if not finding.reachable:
+            if not limits.deadline.over:  # else it was cut short
+                self._walked.add(goal)
             return None
         self._tell(name, "a short walk was first")
         return finding

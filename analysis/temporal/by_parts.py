@@ -95,6 +95,7 @@ class _Goals:
     net: Net
     findings: dict[Formula, Finding] = field(default_factory=dict)
     walked: set[Formula] = field(default_factory=set)
+    """The goals that a walk does not meet."""
 
     @cached_property
     def walks(self) -> Walks:
@@ -106,9 +107,7 @@ class _Goals:
         if goal in self.findings:
             return self.findings[goal]
         walk, reduction = partial(self.walks.decide, firings=_FIRINGS), partial(decide_by_reduction, self.net)
-        deciders = [reduction] if goal in self.walked else [walk, reduction]
-        self.walked.add(goal)
-        for decide in deciders:
+        for decide in [reduction] if goal in self.walked else [walk, reduction]:
             try:
                 finding = decide(goal, limits)
             except (BudgetExceeded, IncompleteGraph):
@@ -116,6 +115,8 @@ class _Goals:
             if finding.reachable is not None:
                 self.findings[goal] = finding
                 return finding
+            if decide is walk and not limits.deadline.over:  # else it was cut short
+                self.walked.add(goal)
         return None
 
 

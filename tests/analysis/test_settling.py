@@ -19,8 +19,9 @@ from firable.analysis.question import Known, unknown, yes
 from firable.analysis.settling import Settling
 from firable.analysis.spaces.reachability import Budget
 from firable.analysis.temporal.queries import question_of
+from firable.analysis.walk import Walks
 from firable.nets.catalogue import catalogue_net
-from firable.nets.formula import Formula
+from firable.nets.formula import Formula, parse_formula
 from firable.nets.net import Net
 from firable.nets.queries import Query, parse_query
 from firable.nets.temporal import Logic, Temporal, parse_temporal
@@ -190,6 +191,33 @@ def test_what_is_nearby_is_met_by_a_short_walk_where_walks_are_allowed(
         assert never.name not in one.found, "a walk concludes nothing"
         one.ask(far, (), lanes, NEVER)
         assert one.found[far.name].status is Status.VIOLATED
+
+
+def test_a_walk_that_was_cut_short_is_walked_again_and_one_that_met_nothing_is_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    lanes = [*by_one_technique(monkeypatch), [Method.WALK]]
+    walked: list[Formula] = []
+    decide = Walks.decide
+
+    def slow(self: Walks, goal: Formula, limits: Limits, *, firings: int) -> Finding:
+        walked.append(goal)
+        while limits.deadline.left_seconds:
+            sleep(0.01)
+        return decide(self, goal, limits, firings=0 if limits.deadline.over else firings)
+
+    monkeypatch.setattr(Walks, "decide", slow)
+    one, (near, never) = settling_of("EF mc.machining", "EF (robot.grasp_cv1 and mc.machining and robot.free)")
+    one.ask(near, (), lanes, Deadline.after(0.05))
+    assert near.name not in one.found
+    one.ask(near, (), lanes, NEVER)
+    assert (one.found[near.name].method, len(walked)) == ("random walk", 2)
+    for _ in range(2):
+        assert one._nearby("never", walked[0], Limits()) is not None
+    goal = parse_formula("robot.grasp_cv1 and mc.machining and robot.free")
+    for _ in range(2):
+        assert one._nearby(never.name, goal, Limits()) is None
+    assert walked.count(goal) == 1
 
 
 class Forgets:
