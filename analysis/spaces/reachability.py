@@ -133,7 +133,7 @@ class ReachabilityGraph(Derived["Column"]):
     @property
     def _limits(self) -> dict[str, Any]:
         """What ends the engine's long work."""
-        return engine_limits(self._moment)
+        return engine_limits(self.moment)
 
     @cached_property
     def ascending(self) -> npt.NDArray[np.intp]:
@@ -154,7 +154,7 @@ class ReachabilityGraph(Derived["Column"]):
     @contextmanager
     def turn(self, share: float, most_seconds: float = inf, /) -> Iterator[Deadline]:
         """Let what passes over all markings meanwhile take at most this part of the time left, and so many seconds."""
-        turn = self._moment.share(share).within(most_seconds)
+        turn = self.moment.share(share).within(most_seconds)
         self._turns.append(turn)
         try:
             yield turn
@@ -162,7 +162,7 @@ class ReachabilityGraph(Derived["Column"]):
             self._turns.pop()
 
     @property
-    def _moment(self) -> Deadline:
+    def moment(self) -> Deadline:
         """When the question of this turn ends."""
         return self._turns[-1] if self._turns else self.deadline
 
@@ -242,7 +242,7 @@ class ReachabilityGraph(Derived["Column"]):
 
         result = self.none()
         for start in range(0, self.n_markings, PART):
-            if start and self._moment.over:
+            if start and self.moment.over:
                 raise BudgetExceeded(REASONS["time"])
             part = result[start : start + PART]
             found = unpacked(term(COLUMNS, self._places.reader(start)))
@@ -257,7 +257,7 @@ class ReachabilityGraph(Derived["Column"]):
         from firable.analysis.spaces.columns import fullest
 
         self.require_complete()
-        return fullest(self._places, places, self.n_markings, self._moment)
+        return fullest(self._places, places, self.n_markings, self.moment)
 
     def some_may_fire(self, some: Iterable[int]) -> Column:
         """The markings in which one of some transitions may fire, in one pass over all markings."""
@@ -316,7 +316,7 @@ class ReachabilityGraph(Derived["Column"]):
 
         With `by`, by edges that fire one of these transitions.
         """
-        if self.complete and targets.all() and not self._moment.over:
+        if self.complete and targets.all() and not self.moment.over:
             return targets.copy()
         transitions = None if by is None else list(by)
         return _column(self.engine.backward(targets.tobytes(), _part(within), transitions, **self._limits))

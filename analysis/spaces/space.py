@@ -105,6 +105,11 @@ class StateSpace(Protocol[S]):
         """When questions to the space end."""
         ...
 
+    @property
+    def moment(self) -> Deadline:
+        """When the question whose turn it is ends: that of the turn, or the deadline where there is none."""
+        ...
+
     def until(self, deadline: Deadline) -> StateSpace[S]:
         """The same space, for questions that end with another deadline."""
         ...
@@ -112,7 +117,7 @@ class StateSpace(Protocol[S]):
     def turn(self, share: float, most_seconds: float = inf, /) -> AbstractContextManager[Deadline]:
         """Let what is asked meanwhile take at most this part of the time that is left, and so many seconds.
 
-        What asks for many things, each of them short, asks the deadline of the turn itself.
+        What asks for many things, each of them short, asks the `moment` of the turn itself.
         """
         ...
 
@@ -251,6 +256,11 @@ class Derived(Generic[S]):
     def turn(self: StateSpace[S], _: float, __: float = inf, /) -> AbstractContextManager[Deadline]:
         """No limit."""
         return nullcontext(self.deadline)
+
+    @property
+    def moment(self: StateSpace[S]) -> Deadline:
+        """The deadline."""
+        return self.deadline
 
     def satisfying(self: StateSpace[S], formula: Formula) -> S:
         """The markings in which a state formula holds."""

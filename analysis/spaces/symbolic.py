@@ -67,18 +67,22 @@ class SymbolicSpace(Derived[MarkingSet]):
         self.engine.limit(**engine_limits(deadline))
         return replace(self, deadline=deadline)
 
+    @property
+    def moment(self) -> Deadline:
+        """When the question of this turn ends."""
+        return self._turns[-1] if self._turns else self.deadline
+
     @contextmanager
     def turn(self, share: float, most_seconds: float = inf, /) -> Iterator[Deadline]:
         """Let what is asked meanwhile take at most this part of the time left: one fixpoint may take all of it."""
-        outer = self._turns[-1] if self._turns else self.deadline
-        turn = outer.share(share).within(most_seconds)
+        turn = self.moment.share(share).within(most_seconds)
         self._turns.append(turn)
         self.engine.limit(**engine_limits(turn))
         try:
             yield turn
         finally:
             self._turns.pop()
-            self.engine.limit(**engine_limits(outer))
+            self.engine.limit(**engine_limits(self.moment))
 
     def require_complete(self) -> None:
         """It always is: an incomplete search makes no space."""

@@ -31,7 +31,7 @@ def refuting(sets: Sets[S], formula: Temporal) -> tuple[Product[S], Pairs[S], Pa
     """
     sets.space.require_complete()
     refuting_one = replaced(positive(negated(formula)), sets.constant)
-    automaton = automaton_of(refuting_one, deadline=sets.space.deadline)
+    automaton = automaton_of(refuting_one, deadline=sets.space.moment)
     product = Product.of(sets, automaton)
     fair = product.fair()
     if not fair:

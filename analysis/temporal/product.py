@@ -156,7 +156,7 @@ class Steps(Generic[S]):
     def into(self, edges: Iterable[ProductEdge[S]], mark: int | None = None) -> S:
         """The markings from which one of the edges (with the mark, if it is given) leads into the pairs.
 
-        Raises `TimeEndedError` where the deadline of the space comes.
+        Raises `TimeEndedError` where the moment of the space comes.
         """
         sets = self.product.sets
         found = []
@@ -164,7 +164,7 @@ class Steps(Generic[S]):
             targets = self.pairs.get(edge.target)
             if targets is None or (mark is not None and mark not in edge.marks):
                 continue
-            if sets.space.deadline.over:
+            if sets.space.moment.over:
                 raise TimeEndedError
             key = (edge.target, edge.by)
             if key not in self._before:

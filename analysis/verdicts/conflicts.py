@@ -208,7 +208,7 @@ class Steps:
             return found
         player = self.graph.witnesses.player
         for index in range(self.graph.n_markings):
-            if self.graph.deadline.over:
+            if self.graph.moment.over:
                 raise BudgetExceeded(REASONS["time"])
             for fired, _ in self.graph.successors(index):
                 if len(fired) > 1 and not player.serialisable(fired):

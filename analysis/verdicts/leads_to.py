@@ -95,7 +95,7 @@ def _by_components(graph: ReachabilityGraph, of: Property) -> Answer:
     start = first(graph.satisfying(of.formula) & graph.backward(around | stuck, without) & without)
     if start is None:
         return yes()
-    prefix = [tuple(fired) for fired in graph.engine.path_to(start, **engine_limits(graph.deadline))]
+    prefix = [tuple(fired) for fired in graph.engine.path_to(start, **engine_limits(graph.moment))]
     prefix_length = len(prefix)
     tail, entry = _way(graph, start, around | stuck, without)
     prefix += tail
@@ -106,7 +106,7 @@ def _by_components(graph: ReachabilityGraph, of: Property) -> Answer:
 
 def _way(graph: ReachabilityGraph, source: int, targets: Column, within: Column) -> tuple[list[FiringSet], int]:
     """A shortest firing sequence through `within` that is known to exist, and the target it reaches."""
-    found = graph.engine.path_between(source, targets.tobytes(), within.tobytes(), **engine_limits(graph.deadline))
+    found = graph.engine.path_between(source, targets.tobytes(), within.tobytes(), **engine_limits(graph.moment))
     if found is None:
         raise WitnessError("there is no way to a marking from which it was found by going back")
     firings, target = found
@@ -118,7 +118,7 @@ def _cycle(graph: ReachabilityGraph, within: Column, fairness: Fairness, entry: 
     walk = _Walk(graph, within, entry)
     if fairness is Fairness.STRONG:
         for t, count in enumerate(graph.fired()):
-            if graph.deadline.over:
+            if graph.moment.over:
                 raise BudgetExceeded(REASONS["time"])
             if count and t not in walk.fired and (enabled := graph.may_fire(t) & within).any():
                 walk.fire(t, enabled)

@@ -184,7 +184,7 @@ def starvation_free(behaviour: Behaviour[Any]) -> Verdict:
     def find() -> Answer:
         space = behaviour.space
         try:
-            run = eager_run(space.net, deadline=space.deadline if isinstance(space, ReachabilityGraph) else NEVER)
+            run = eager_run(space.net, deadline=space.moment if isinstance(space, ReachabilityGraph) else NEVER)
         except GatesCannotBeOpenError as error:
             if space.complete and not behaviour.live:
                 return NONE_STARVES
