@@ -159,6 +159,17 @@ class Graph:
         Every marking before the last is in `within` (E[within U targets]). Empty where the marking is itself a
         target. That there is none needs the whole graph.
         """
+    def expect(
+        self,
+        questions: int,
+        *,
+        max_seconds: float | None = None,
+        cancelled: Callable[[], bool] | None = None,
+    ) -> None:
+        """Get ready for so many questions that go against the edges: store these where that pays.
+
+        Needs the whole graph.
+        """
     def backward(
         self,
         targets: list[int] | bytes,

@@ -178,7 +178,9 @@ def report_on(
         *(partial(on_property, of) for of in space.net.properties),
         *(partial(on_query, query) for query in queries),
     ]
-    verdicts = _in_turn(space, on_the_net if of_the_net else [], stated, _shows(space, queries, known))
+    asked = on_the_net if of_the_net else []
+    formulas = _formulas(space.net, queries, known)
+    verdicts = _in_turn(space, asked, stated, _shows(space, queries, known), formulas)
     found = figures(behaviour, conflicts, steps) if of_the_net else Figures(**_size(space))
     return CheckReport(space.net, space.discipline, found, verdicts, space)
 
@@ -188,10 +190,17 @@ def _in_turn(
     on_the_net: Sequence[Callable[[], Verdict]],
     stated: Sequence[Callable[[], Verdict]],
     shows: Mapping[str, Callable[[], Verdict]],
+    formulas: int = 0,
 ) -> tuple[Verdict, ...]:
-    """What is answered, in the order of the questions; of what is known, what `shows` it, where there is time."""
+    """What is answered, in the order of the questions; of what is known, what `shows` it, where there is time.
+
+    So many of what is stated are formulas of CTL.
+    """
     asks, verdicts = [*on_the_net, *stated], []
     for later, ask in zip(range(len(asks), 0, -1), asks, strict=True):
+        if later == len(stated) and formulas and space.complete:
+            with space.turn(_READY_SHARE):
+                space.expect(formulas)
         with space.turn(_TURN_SHARE if later > len(stated) else _even_share(space.deadline, later)):
             verdicts.append(ask())
     if not space.complete:
@@ -221,6 +230,14 @@ def _even_share(deadline: Deadline, later: int) -> float:
     return min(_TURN_SHARE, max(1 / later, _TURN_SECONDS_MIN / left)) if left else _TURN_SHARE
 
 
+def _formulas(net: Net, queries: Sequence[Query], known: Mapping[str, Verdict]) -> int:
+    """How many formulas of CTL, stated or asked, are not known."""
+    stated = (of for of in net.properties if isinstance(of, TemporalProperty) and of.logic is Logic.CTL)
+    asked = (query for query in queries if query.kind is QueryKind.CTL)
+    names = [*(f"property.{of.name}" for of in stated), *(f"query.{query.name}" for query in asked)]
+    return sum(name not in known for name in names)
+
+
 def _shows(
     space: StateSpace[Any], queries: Sequence[Query], known: Mapping[str, Verdict]
 ) -> dict[str, Callable[[], Verdict]]:
@@ -235,6 +252,8 @@ _SHOWING_SECONDS_MAX: Final = 5.0
 """How long a run is looked for that shows a verdict which is known."""
 _TURN_SHARE: Final = 0.4
 """The part of the time left that one verdict may take before the others have been asked for."""
+_READY_SHARE: Final = 0.4
+"""The part of the time left that it may take to get ready for many formulas."""
 _TURN_SECONDS_MIN: Final = 1.0
 """How long one on what is stated may take even if all cannot: with less, none would come to its end."""
 _FIGURE_SHARE: Final = 0.1

@@ -14,7 +14,7 @@ than the graph. Those of places are kept, packed, as far as they fit: questions 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
@@ -305,6 +305,11 @@ class ReachabilityGraph(Derived["Column"]):
     def successors(self, index: int) -> list[tuple[FiringSet, int]]:
         """What may fire in a marking, and the number of the marking after it."""
         return [(tuple(fired), target) for fired, target in self.engine.successors(index, **self._limits)]
+
+    def expect(self, formulas: int) -> None:
+        """Get ready for so many formulas of CTL, where they come to more than that takes and it is done in time."""
+        with suppress(BudgetExceeded):
+            self.engine.expect(formulas, **self._limits)
 
     def before(self, targets: Column, by: Iterable[int] | None = None) -> Column:
         """The markings with an edge into the targets (EX); with `by`, an edge that fires one of these transitions."""

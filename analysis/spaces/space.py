@@ -121,6 +121,10 @@ class StateSpace(Protocol[S]):
         """
         ...
 
+    def expect(self, formulas: int) -> None:
+        """Get ready for so many formulas of CTL, if the space is whole and that takes less than they would without."""
+        ...
+
     def require_complete(self) -> None:
         """Raise `IncompleteGraph` unless every reachable marking is known."""
         ...
@@ -261,6 +265,9 @@ class Derived(Generic[S]):
     def moment(self: StateSpace[S]) -> Deadline:
         """The deadline."""
         return self.deadline
+
+    def expect(self: StateSpace[S], _: int) -> None:
+        """There is nothing to get ready."""
 
     def satisfying(self: StateSpace[S], formula: Formula) -> S:
         """The markings in which a state formula holds."""

@@ -14,12 +14,15 @@ import pytest
 from firable.analysis._engine import BudgetExceeded
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.question import Answer, Question, unknown, yes
-from firable.analysis.report import _in_turn
+from firable.analysis.report import _formulas, _in_turn
 from firable.analysis.spaces.reachability import explore
 from firable.analysis.spaces.space import StateSpace
 from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.nets.catalogue import family_net
 from firable.nets.formula import Holds
+from firable.nets.net import TemporalProperty
+from firable.nets.queries import Query, QueryKind
+from firable.nets.temporal import Logic, parse_temporal
 from firable.nets.verdict import Cost, Status, Verdict, Witness
 from firable.semantics.trace import Discipline
 
@@ -39,6 +42,9 @@ class Turns:
         self.share, self.most_seconds = share, most_seconds
         yield
         self.share, self.most_seconds = 1.0, inf
+
+    def expect(self, formulas: int) -> None:
+        self.asked.append((f"expect {formulas}", self.share))
 
     def ask(self, name: str, needs: float) -> Verdict:
         """Decided with so large a part of the time."""
@@ -70,6 +76,42 @@ def test_what_is_stated_shares_the_time_evenly() -> None:
     turns = Turns(Deadline.after(3600))
     assert decided(turns, stated=True, a=0.24, b=0.24, c=0.3, d=0.41) == {"a": True, "b": True, "c": True, "d": True}
     assert [share for _, share in turns.asked] == pytest.approx([1 / 4, 1 / 3, 0.4, 0.4, 1 / 2])
+
+
+def test_the_space_gets_ready_for_the_formulas_before_the_first_thing_that_is_stated() -> None:
+    turns = Turns(Deadline.after(3600))
+    asks = [partial(turns.ask, name, 0.0) for name in ("of the net", "formula", "another")]
+    _in_turn(cast(StateSpace[Any], turns), asks[:1], asks[1:], {}, 2)
+    assert [name for name, _ in turns.asked] == ["of the net", "expect 2", "formula", "another"]
+    turns = Turns(Deadline.after(3600), complete=False)
+    _in_turn(cast(StateSpace[Any], turns), [], [partial(turns.ask, "formula", 0.0)], {}, 2)
+    assert [name for name, _ in turns.asked] == ["formula"]
+
+
+def test_a_graph_stores_its_edges_for_many_formulas_and_keeps_them_out_where_time_is_short() -> None:
+    net = family_net("machines-12")
+    few, many, late = explore(net), explore(net), explore(net)
+    bare = few.engine.memory_bytes
+    few.expect(2)
+    many.expect(3)
+    late.until(Deadline.after(0)).expect(3)
+    assert few.engine.memory_bytes == late.engine.memory_bytes == bare
+    assert many.engine.memory_bytes > bare + 4 * (many.n_edges or 0)
+    targets = many.satisfying(Holds(net.places[0].name))
+    assert (many.backward(targets) == few.backward(targets)).all()
+
+
+def test_formulas_of_ctl_that_are_not_known_are_counted() -> None:
+    net = family_net("machines-2")
+    stated = (
+        TemporalProperty("a", Logic.CTL, parse_temporal("AG EF start")),
+        TemporalProperty("b", Logic.LTL, parse_temporal("G F start")),
+    )
+    net = replace(net, properties=stated)
+    queries = [Query(name, QueryKind.CTL, parse_temporal("EG start")) for name in ("c", "d")]
+    assert _formulas(net, queries, {}) == 3
+    known = Question("query.c", "c").settle(yes(), "", Discipline.INTERLEAVING, Cost())
+    assert _formulas(net, queries, {known.name: known}) == 2
 
 
 def test_what_is_known_is_shown_in_the_end_where_that_does_not_take_long() -> None:

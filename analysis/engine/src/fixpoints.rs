@@ -4,8 +4,8 @@
 //! what waits is taken in the order of the indexes (`Agenda`), so a search against the edges costs about what the
 //! exploration did; fifty times as much where many transitions differ only in what they ask before, as those of a cell with
 //! its machines do, because most of what they come from was never reached. So who asks again and again counts what was
-//! tried, and before that comes to more than it costs to store the edges, in the middle of a search or between two, they
-//! are stored (`Against`): turned round, where a search stays in a set, and costs some ten nanoseconds an edge then; or as
+//! tried, and before that comes to more than it costs to store the edges, in the middle of a search or between two, or
+//! before the first if it is said that many follow, they are stored (`Against`): turned round, where a search stays in a set, and costs some ten nanoseconds an edge then; or as
 //! those of the components, where it goes anywhere (`Condensed`), and costs two or three.
 //!
 //! One step back is asked from whichever side is smaller: the predecessors of few targets are computed, and of many, each
@@ -53,17 +53,27 @@ impl Against {
 
     /// The edges turned round, if they are stored or worth it now: their bytes count as held by the graph.
     fn edges(&self, space: &Space, watch: &mut Watch<'_>) -> Result<Option<&Csr>, Stop> {
-        if self.edges.get().is_none() && self.is_worth_storing(space, watch) {
-            let memory = space.memory.clone();
-            let edges = Csr::new(space, None, &memory, watch).and_then(|edges| edges.reversed(&memory, watch));
-            keep(&self.edges, edges, Csr::bytes, space)?;
+        if self.edges.get().is_none() && self.is_worth_storing(space) && !is_late(space, watch) {
+            self.store(space, watch)?;
         }
         Ok(self.stored())
     }
 
+    fn store(&self, space: &Space, watch: &mut Watch<'_>) -> Result<(), Stop> {
+        let memory = space.memory.clone();
+        let edges = Csr::new(space, None, &memory, watch).and_then(|edges| edges.reversed(&memory, watch));
+        keep(&self.edges, edges, Csr::bytes, space)
+    }
+
+    /// Counts so many questions to come as if each tried every edge once, and stores the edges where that is enough.
+    pub fn expect(&self, questions: u64, space: &Space, watch: &mut Watch<'_>) -> Result<(), Stop> {
+        self.tried.fetch_add(questions.saturating_mul(space.edges), Ordering::Relaxed);
+        if self.edges.get().is_none() && self.is_worth_storing(space) { self.store(space, watch) } else { Ok(()) }
+    }
+
     /// The components, likewise.
     fn condensed(&self, space: &Space, watch: &mut Watch<'_>) -> Result<Option<&Condensed>, Stop> {
-        if self.condensed.get().is_none() && self.is_worth_storing(space, watch) {
+        if self.condensed.get().is_none() && self.is_worth_storing(space) && !is_late(space, watch) {
             let condensed = Condensed::new(space, &space.memory.clone(), watch);
             keep(&self.condensed, condensed, Condensed::bytes, space)?;
         }
@@ -93,16 +103,19 @@ impl Against {
         self.tried.load(Ordering::Relaxed) > WORTH * space.edges
     }
 
-    /// Whether storing the edges costs less than to do without, and takes neither from this question its time nor from
-    /// later ones the memory that they need for edges of their own.
-    fn is_worth_storing(&self, space: &Space, watch: &Watch<'_>) -> bool {
+    /// Whether storing the edges costs less than to do without, and takes not the memory that later questions need for
+    /// edges of their own.
+    fn is_worth_storing(&self, space: &Space) -> bool {
         let left = space.memory.limit().saturating_sub(space.memory.used());
         let has_room = Csr::bytes_of(space).is_some_and(|bytes| left / ROOM >= bytes);
-        // Under steps each question would store them.
-        let is_late = |end: Instant| end.duration_since(Instant::now()).as_secs_f64() < STORING * space.seconds;
-        let pays = self.has_tried_enough(space) && !watch.deadline().is_some_and(is_late);
-        has_room && (space.step || pays)
+        has_room && (space.step || self.has_tried_enough(space)) // under steps each question would store them
     }
+}
+
+/// Whether storing edges, under interleaving, might take a question its time.
+fn is_late(space: &Space, watch: &Watch<'_>) -> bool {
+    let seconds = |end: Instant| end.duration_since(Instant::now()).as_secs_f64();
+    !space.step && watch.deadline().is_some_and(|end| seconds(end) < STORING * space.seconds)
 }
 
 /// Keeps what was stored for later questions, and its bytes as held by the graph; nothing where it does not fit.
@@ -143,15 +156,21 @@ pub fn backward(
     watch: &mut Watch<'_>,
 ) -> Result<Vec<u8>, Stop> {
     let memory = space.memory.clone();
+    if targets.iter().all(|&target| target == 0) {
+        watch.tick(targets.len())?;
+        return memory.filled(0u8, targets.len());
+    }
     let is_anywhere = within.is_none() && by.is_none();
     if is_anywhere && let Some(condensed) = against.condensed(space, watch)? {
         return condensed.backward(targets, &memory, watch);
     }
     let mut search = Search::new(space, targets, within, &memory)?;
-    if !is_anywhere
-        && by.is_none()
-        && let Some(edges) = against.edges(space, watch)?
-    {
+    let edges = match by {
+        None if is_anywhere => against.stored(),
+        None => against.edges(space, watch)?,
+        Some(_) => None,
+    };
+    if let Some(edges) = edges {
         return search.along(edges, watch);
     }
     if space.step {
@@ -470,6 +489,28 @@ mod tests {
     use super::*;
     use crate::budget::unwatched;
     use crate::samples::random_spaces;
+
+    #[test]
+    fn edges_are_stored_before_the_first_of_many_questions_and_say_the_same() {
+        let mut stored = 0;
+        for space in random_spaces(200, false) {
+            let mut poll = unwatched;
+            let mut watch = Watch::new(None, &mut poll);
+            let against = Against::default();
+            against.expect(WORTH, &space, &mut watch).expect("fits");
+            assert!(against.stored().is_none());
+            against.expect(1, &space, &mut watch).expect("fits");
+            assert_eq!(against.stored().is_some(), space.edges > 0);
+            stored += usize::from(against.stored().is_some());
+            let bytes = |nth: usize| (1..=space.len()).map(|at| u8::from(at % nth == 0)).collect::<Vec<u8>>();
+            let (targets, within) = (bytes(3), bytes(2));
+            for within in [None, Some(within.as_slice())] {
+                let found = backward(&space, &targets, within, None, &against, &mut watch);
+                assert_eq!(found, backward(&space, &targets, within, None, &Against::default(), &mut watch));
+            }
+        }
+        assert!(stored > 100, "{stored}");
+    }
 
     /// The markings of a set that a run need not leave, by sweeps over all edges.
     fn staying(edges: &Csr, within: &[u8]) -> Vec<u8> {

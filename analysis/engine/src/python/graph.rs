@@ -254,6 +254,19 @@ impl Graph {
         Ok(found)
     }
 
+    #[pyo3(signature = (questions, *, max_seconds=None, cancelled=None))]
+    fn expect(
+        &self,
+        py: Python<'_>,
+        questions: u64,
+        max_seconds: Option<f64>,
+        cancelled: Option<Py<PyAny>>,
+    ) -> PyResult<()> {
+        let patience = Patience::new(max_seconds, cancelled)?;
+        self.whole("to get ready for questions")?;
+        self.long(py, &patience, |space, watch| self.against.expect(questions, space, watch))
+    }
+
     #[pyo3(signature = (targets, within=None, by=None, *, max_seconds=None, cancelled=None))]
     fn backward<'py>(
         &self,
