@@ -349,6 +349,7 @@ def find_lasso(
     n_marks: int,
     *,
     seed: int | None = None,
+    sparing: bool = False,
     max_vertices: int,
     max_memory_bytes: int,
     max_seconds: float | None,
@@ -360,7 +361,8 @@ def find_lasso(
     edges of a state, the first row those of the first state: (label that the marking satisfies, whether only the
     transitions listed are admitted or all but these, they, whether it may be taken in a deadlock, target, marks). A run
     is accepted if it takes edges with each mark again and again. With a `seed` firings are tried in a drawn order. A
-    vertex is a marking with a state. Running out of a budget leaves the search incomplete.
+    vertex is a marking with a state. Running out of a budget leaves the search incomplete. One that is `sparing` leaves
+    out firings that can wait: finding no run, it has not shown that there is none.
 
     Raises `ValueError` for a place, label, state, transition or mark out of range, more than 64 marks, a negative time.
 

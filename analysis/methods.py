@@ -129,7 +129,7 @@ GOALS: Final[dict[Method, Technique[GoalDecider]]] = {
 }
 
 FORMULAS: Final[dict[Logic, dict[Method, Technique[FormulaDecider]]]] = {
-    Logic.LTL: {Method.ON_THE_FLY: Anew("on the fly", "firable.analysis.temporal.on_the_fly:decide_ltl_on_the_fly")},
+    Logic.LTL: {Method.ON_THE_FLY: Technique("on the fly", "firable.analysis.temporal.on_the_fly:LtlOnTheFly")},
     Logic.CTL: {Method.ON_THE_FLY: Technique("on the fly", "firable.analysis.temporal.by_parts:CtlByParts")},
 }
 

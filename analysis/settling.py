@@ -32,7 +32,7 @@ from firable.analysis.methods import FORMULAS, GOALS, KNOWERS, WORTH_ASKING, Ane
 from firable.analysis.question import Answer, Known, Question, no, yes
 from firable.analysis.race import SLICES_SECONDS, Contestant, Outcome, T, race
 from firable.analysis.spaces.space import WitnessError
-from firable.analysis.temporal.on_the_fly import decide_ltl_on_the_fly
+from firable.analysis.temporal.on_the_fly import Turn, decide_ltl_on_the_fly
 from firable.analysis.temporal.queries import as_goal, question_of, temporal_question
 from firable.analysis.verdicts.behaviour import QUESTIONS
 from firable.analysis.verdicts.bounds import greatest
@@ -187,7 +187,7 @@ class Settling:
                 continue
             limits = self._limits(question.name, deadline)
             try:
-                known = decide_ltl_on_the_fly(self.net, formula, limits, turns=[(None, vertices)])
+                known = decide_ltl_on_the_fly(self.net, formula, limits, turns=[Turn(None, vertices)])
             except IncompleteGraph:
                 continue
             except KeyboardInterrupt:

@@ -74,3 +74,15 @@ def with_states(formula: Temporal, changed: Callable[[Formula], Formula]) -> Tem
 def has_events(formula: Temporal) -> bool:
     """Whether the formula speaks of firings, and not of markings alone."""
     return any(isinstance(atom, Fires) for atom in atoms_in(formula))
+
+
+def has_next(formula: Temporal) -> bool:
+    """Whether the formula has the operator X, and so may tell apart how long a run stays with the same values.
+
+    >>> from firable.nets.temporal import parse_temporal
+    >>> has_next(parse_temporal("G (p -> F X q)")), has_next(parse_temporal("G (p -> F q)"))
+    (True, False)
+    """
+    return not isinstance(formula, Formula) and (
+        isinstance(formula, Next) or any(map(has_next, operands_of(formula)))
+    )

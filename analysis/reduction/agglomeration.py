@@ -48,6 +48,7 @@ from typing import Final
 from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.certificate import Rule
 from firable.analysis.reduction.draft import Draft, Literal, Move, Tail, composed, literal
+from firable.analysis.reduction.goals import Labels
 from firable.analysis.reduction.pairs import Facts
 
 _AROUND_MAX: Final = 2_000  # moves looked at for one place, so that places that all share cost no square
@@ -146,8 +147,9 @@ class _Around:
         return (one ^ 1 for move in moves for one in move.made if one // 2 != self.place)
 
     def wanted(self, one: Literal) -> bool:
-        """Whether a goal that is no deadlock may become true by a literal."""
-        return not self.draft.deadlock and one in self.draft.goal_literals
+        """Whether a goal that is no deadlock, or a label along a run, may become true by a literal."""
+        matters = isinstance(self.draft.goal, Labels) or not self.draft.deadlock
+        return matters and one in self.draft.goal_literals
 
     def closers_early(self) -> bool:
         """Whether each closer can be made as soon as the place is away, and is missed by nobody."""

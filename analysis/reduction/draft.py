@@ -31,8 +31,7 @@ from typing import Final
 from firable.analysis._engine import BudgetExceeded
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.certificate import Rule, Step
-from firable.analysis.reduction.goals import Goal, Value, literals_in, rewritten
-from firable.nets.formula import Constant
+from firable.analysis.reduction.goals import Goal, Labels, Value
 from firable.nets.net import Net, Place, Transition
 
 _POLL: Final = 1_000  # transitions that are read between two looks at the deadline
@@ -113,7 +112,7 @@ class Tail:
 
 @dataclass(slots=True)
 class Draft:
-    """A net under reduction, and the goal that is preserved, None where it is what each transition can do.
+    """A net under reduction, and what is preserved: the goal, labels, or, where None, what each transition can do.
 
     Raises `BudgetExceeded` where the deadline comes before the net is read: a part of it says nothing.
 
@@ -124,7 +123,7 @@ class Draft:
     """
 
     net: Net
-    goal: Goal | None
+    goal: Goal | Labels | None
     deadline: Deadline = NEVER
     values: list[bool] = field(init=False)
     places: set[int] = field(init=False)
@@ -176,7 +175,7 @@ class Draft:
 
     def note(self, rule: Rule, moves: Iterable[int] = (), places: Iterable[int] = ()) -> None:
         """Keep a step for those who check it; a goal that is false already needs no more of them."""
-        if self.goal is not None and self.goal.formula != Constant(value=False):
+        if isinstance(self.goal, Goal) and not self.goal.is_false:
             self.steps.append(Step(rule, tuple(moves), tuple(self.net.places[p].name for p in places)))
 
     @property
@@ -188,7 +187,7 @@ class Draft:
     def goal_literals(self) -> frozenset[Literal]:
         """The literals that the goal may become true by; none where there is no goal."""
         if self._goal_literals is None:
-            found = () if self.goal is None else literals_in(self.goal.formula)
+            found = () if self.goal is None else self.goal.literals()
             index = self.net.place_index
             self._goal_literals = frozenset(literal(index[place], value) for place, value in found)
         return self._goal_literals
@@ -238,9 +237,9 @@ class Draft:
         """Replace places in the goal by what stands for them."""
         if self.goal is not None and any(self.protected(place) for place in values):
             named = {self.net.places[place].name: value for place, value in values.items()}
-            self.settle(Goal(rewritten(self.goal.formula, named), self.goal.deadlock))
+            self.settle(self.goal.rewritten(named))
 
-    def settle(self, goal: Goal) -> None:
+    def settle(self, goal: Goal | Labels) -> None:
         """Put another goal in the place of the one there was, to which it must be equivalent."""
         self.goal, self._goal_literals = goal, None
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 from firable.nets.formula import (
     And,
@@ -49,6 +50,39 @@ class Goal:
         if not self.deadlock or self.formula == Constant(value=False):
             return self.formula
         return Deadlock() if self.formula == Constant(value=True) else And((Deadlock(), self.formula))
+
+    @property
+    def is_false(self) -> bool:
+        """Whether no marking can satisfy it."""
+        return self.formula == Constant(value=False)
+
+    def literals(self) -> Iterator[tuple[str, bool]]:
+        """The places with the values that it may become true by."""
+        return literals_in(self.formula)
+
+    def rewritten(self, values: Mapping[str, Value]) -> Goal:
+        """The same with what stands for places in their place."""
+        return Goal(rewritten(self.formula, values), self.deadlock)
+
+
+@dataclass(frozen=True, slots=True)
+class Labels:
+    """Formulas over places alone, of which it matters along a maximal run where each is true and where it is not."""
+
+    formulas: tuple[Formula, ...]
+    deadlock: ClassVar = True
+    is_false: ClassVar = False
+
+    def literals(self) -> Iterator[tuple[str, bool]]:
+        """The places that they speak of, with both values."""
+        for formula in self.formulas:
+            for place, _ in literals_in(formula):
+                yield place, False
+                yield place, True
+
+    def rewritten(self, values: Mapping[str, Value]) -> Labels:
+        """The same with what stands for places in their place."""
+        return Labels(tuple(rewritten(formula, values) for formula in self.formulas))
 
 
 def goal_of(net: Net, formula: Formula) -> Goal:

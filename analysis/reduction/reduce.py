@@ -11,7 +11,7 @@ there is always a result.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from firable.analysis.deadline import Deadline
@@ -22,7 +22,7 @@ from firable.analysis.reduction.constants import remove_constants
 from firable.analysis.reduction.copies import merge_places, remove_subsumed
 from firable.analysis.reduction.draft import Draft, Move, Origin, Tail, flat
 from firable.analysis.reduction.early import fire_early
-from firable.analysis.reduction.goals import Goal, goal_of
+from firable.analysis.reduction.goals import Goal, Labels, goal_of, rewritten, written_out
 from firable.analysis.reduction.implied import remove_dead, remove_implied_gates, remove_implied_places
 from firable.analysis.reduction.pairs import MATRIX_BYTES_MAX, NoFacts, Pairs, pairs
 from firable.analysis.reduction.relevance import remove_irrelevant
@@ -35,51 +35,42 @@ from firable.semantics.formulas import evaluate
 from firable.semantics.player import holds_in
 from firable.semantics.trace import Discipline
 
+@dataclass(frozen=True, kw_only=True)
+class _WithRuns:
+    """A smaller net whose runs stand for runs of the `original` one, under interleaving, external gates free.
 
-@dataclass(frozen=True)
-class Reduced:
-    """A smaller net in which the goal is reachable if and only if it is in the `original`, and the way back.
-
-    Under interleaving, external gates free. `original_goal` and `goal` say the same of either net. `applied` counts the
-    applications of each rule, `steps` lists them for those who check them.
+    `applied` counts the applications of each rule.
     """
 
     original: Net
-    original_goal: Formula
     net: Net
-    goal: Formula
     applied: Mapping[str, int]
     first: tuple[Origin, ...]
     moves: Mapping[str, Move]
     tails: tuple[Tail, ...]
-    steps: tuple[Step, ...]
 
     @property
     def summary(self) -> str:
         """What was reduced to what, by which rules: for the method of a verdict."""
         return _summary(self.original, self.net, self.applied)
 
-    def lift(self, firings: Iterable[str], note: str = "") -> Witness:
-        """The firing sequence of the original net that a sequence of the reduced one into its goal stands for.
+    def _lifted(self, firings: Iterable[str]) -> list[int]:
+        return [t for name in firings for t in flat(self.moves[name].origin)]
 
-        It is replayed by the reference player and must end in the original goal; raises `WitnessError` otherwise.
-        """
-        found = [t for origin in self.first for t in flat(origin)]
-        for name in firings:
-            found += flat(self.moves[name].origin)
-        marking = self._played(self.original.initial_marking, found)
+    def _from_the_start(self, firings: Iterable[str]) -> list[int]:
+        return [*(t for origin in self.first for t in flat(origin)), *self._lifted(firings)]
+
+    def _ended(self, fired: list[int]) -> tuple[list[int], Marking]:
+        """A sequence followed by what the tails fire then, and where it leads."""
+        marking = self._played(self.original.initial_marking, fired)
         for tail in reversed(self.tails):
             for move in tail.moves:
                 if all(bool(marking >> place & 1) == value for place, value in move.needs.items()):
                     more = flat(move.origin)
                     marking = self._played(marking, more)
-                    found += more
+                    fired = [*fired, *more]
                     break
-        witnesses = Witnesses(self.original, Discipline.INTERLEAVING)
-        witness = witnesses.replayed([(t,) for t in found], marking, note)
-        if not evaluate(BOOL, self.original, self.original_goal, holds_in(marking)):
-            raise WitnessError("the lifted firing sequence does not end in the goal")
-        return witness
+        return fired, marking
 
     def _played(self, marking: Marking, firings: Iterable[int]) -> Marking:
         """Where a firing sequence leads if it can be fired, which the reference player sees to afterwards."""
@@ -87,6 +78,51 @@ class Reduced:
             masks = self.original.masks[t]
             marking = marking & ~masks.inputs | masks.outputs
         return marking
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reduced(_WithRuns):
+    """A smaller net in which the goal is reachable if and only if it is in the `original`, and the way back.
+
+    `original_goal` and `goal` say the same of either net. `steps` lists the applications of rules for those who check
+    them.
+    """
+
+    original_goal: Formula
+    goal: Formula
+    steps: tuple[Step, ...]
+
+    def lift(self, firings: Iterable[str], note: str = "") -> Witness:
+        """The firing sequence of the original net that a sequence of the reduced one into its goal stands for.
+
+        It is replayed by the reference player and must end in the original goal; raises `WitnessError` otherwise.
+        """
+        found, marking = self._ended(self._from_the_start(firings))
+        witnesses = Witnesses(self.original, Discipline.INTERLEAVING)
+        witness = witnesses.replayed([(t,) for t in found], marking, note)
+        if not evaluate(BOOL, self.original, self.original_goal, holds_in(marking)):
+            raise WitnessError("the lifted firing sequence does not end in the goal")
+        return witness
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReducedRuns(_WithRuns):
+    """A smaller net with a maximal run for each one of the `original`, and the way back.
+
+    Of the two runs the `labels` have the same values in the same order, though one may stay longer with them. They
+    give, for state formulas of the original net, what stands for them in the small one.
+    """
+
+    labels: Mapping[Formula, Formula]
+
+    def lift(self, prefix: Iterable[str], cycle: Iterable[str]) -> tuple[list[int], list[int]]:
+        """The run of the original net that a lasso, or without a cycle a run into a deadlock, stands for.
+
+        The cycle closes there too: it can be fired again, so each place that it needs is as it was. Nothing is replayed
+        here.
+        """
+        found, again = self._from_the_start(prefix), self._lifted(cycle)
+        return (found, again) if again else (self._ended(found)[0], [])
 
 
 @dataclass(frozen=True)
@@ -135,18 +171,54 @@ def reduce_for_goal(net: Net, goal: Formula, limits: Limits | None = None) -> Re
     draft = Draft(net, goal_of(net, goal), limits.deadline)
     _reduce(draft, limits)
     small, numbers = draft.as_net()
-    assert draft.goal is not None
+    assert isinstance(draft.goal, Goal)
     moves = {name: draft.moves[number] for name, number in numbers.items()}
     return Reduced(
-        net,
-        goal,
-        small,
-        draft.goal.as_formula(),
-        draft.applied,
-        tuple(draft.first),
-        moves,
-        tuple(draft.tails),
-        tuple(draft.steps),
+        original=net,
+        net=small,
+        applied=draft.applied,
+        first=tuple(draft.first),
+        moves=moves,
+        tails=tuple(draft.tails),
+        original_goal=goal,
+        goal=draft.goal.as_formula(),
+        steps=tuple(draft.steps),
+    )
+
+
+def reduce_for_runs(net: Net, labels: Sequence[Formula], limits: Limits | None = None) -> ReducedRuns:
+    """Reduce a net, keeping for each maximal run one that goes through the same values of some state formulas.
+
+    A maximal run goes on for ever or ends in a deadlock; how long one stays with each value is not kept. So a formula of
+    LTL over these that has no X holds in the one net if and only if it holds in the other (Poitrenaud and Pradat-Peyre
+    2000, "Pre- and post-agglomerations for LTL model checking"). The rules are those that keep deadlocks, which look
+    besides that no move is put off or made early that changes a label: so their proofs, which put firings in another
+    order, are of infinite runs too. What they add to such a run or leave out of it is one firing that changes no label.
+
+    Cost: as of `reduce_for_goal`.
+
+    Raises `BudgetExceeded` where the deadline comes before the net is read.
+
+    >>> from firable.nets.formula import Holds
+    >>> from firable.nets.catalogue.families import family_net
+    >>> net = family_net("pipeline-8")
+    >>> reduced = reduce_for_runs(net, [Holds(net.places[0].name)])
+    >>> len(reduced.net.places) < len(net.places)
+    True
+    """
+    limits = limits or Limits()
+    draft = Draft(net, Labels(tuple(rewritten(written_out(net, of), {}) for of in labels)), limits.deadline)
+    _reduce(draft, limits)
+    small, numbers = draft.as_net()
+    assert isinstance(draft.goal, Labels)
+    return ReducedRuns(
+        original=net,
+        net=small,
+        applied=draft.applied,
+        first=tuple(draft.first),
+        moves={name: draft.moves[number] for name, number in numbers.items()},
+        tails=tuple(draft.tails),
+        labels=dict(zip(labels, draft.goal.formulas, strict=True)),
     )
 
 
@@ -208,11 +280,11 @@ def _by_arcs(draft: Draft, fired: set[int], deadline: Deadline) -> None:
 
 def _settle(draft: Draft) -> None:
     """Let go of deadlocks where there can be none, because a move needs nothing or the goal is false."""
-    if draft.goal is not None and draft.goal.deadlock:
+    if isinstance(draft.goal, Goal) and draft.goal.deadlock:
         if (free := next((number for number, move in draft.moves.items() if not move.needs), None)) is not None:
             draft.note(Rule.ALWAYS, (free,))
             draft.settle(Goal(Constant(value=False)))
-        elif draft.goal.formula == Constant(value=False):
+        elif draft.goal.is_false:
             draft.settle(Goal(draft.goal.formula))
 
 

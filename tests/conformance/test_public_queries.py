@@ -22,7 +22,7 @@ from firable.analysis.spaces.reachability import ReachabilityGraph, explore
 from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.analysis.temporal.ctl import Ctl
 from firable.analysis.temporal.local import decide_ctl_on_the_fly
-from firable.analysis.temporal.on_the_fly import decide_ltl_on_the_fly
+from firable.analysis.temporal.on_the_fly import Turn, decide_ltl_on_the_fly
 from firable.analysis.temporal.queries import answer
 from firable.analysis.temporal.sets import Sets
 from firable.analysis.temporal.simplifying import simplified
@@ -146,7 +146,7 @@ def test_what_is_decided_of_large_nets_on_the_fly_is_what_was_published(file: st
         if query.kind is not QueryKind.LTL or query.formula is None:
             continue
         try:
-            found = decide_ltl_on_the_fly(loaded.net, query.formula, Limits(), turns=[(None, VERTICES_MAX)])
+            found = decide_ltl_on_the_fly(loaded.net, query.formula, Limits(), turns=[Turn(None, VERTICES_MAX)])
         except IncompleteGraph:
             continue
         assert found.answer.holds is (wanted == "TRUE"), query.name

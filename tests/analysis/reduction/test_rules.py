@@ -11,7 +11,7 @@ from firable.analysis.reduction.constants import remove_constants
 from firable.analysis.reduction.copies import merge_places, remove_subsumed
 from firable.analysis.reduction.draft import Draft, flat
 from firable.analysis.reduction.early import fire_early
-from firable.analysis.reduction.goals import goal_of
+from firable.analysis.reduction.goals import Goal, goal_of
 from firable.analysis.reduction.implied import remove_dead, remove_implied_gates, remove_implied_places
 from firable.analysis.reduction.pairs import Pairs, pairs
 from firable.analysis.reduction.relevance import remove_irrelevant
@@ -43,7 +43,7 @@ def fired(draft: Draft) -> set[tuple[str, ...]]:
 
 
 def goal(draft: Draft) -> str:
-    assert draft.goal is not None
+    assert isinstance(draft.goal, Goal)
     return format_formula(draft.goal.as_formula())
 
 

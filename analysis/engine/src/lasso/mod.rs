@@ -15,10 +15,13 @@
 //!
 //! Rejected: nested depth-first search (Courcoubetis, Vardi, Wolper, Yannakakis 1992), which knows one mark only, so
 //! the automaton would have to be copied for each, and finds the cycle later; it would save the number of a vertex, four
-//! bytes beside a marking and its slot. A search that keeps sets of transitions stubborn needs the formula to be blind
-//! for stuttering and a proviso on cycles, and is not tried.
+//! bytes beside a marking and its slot.
+//!
+//! On request firings that can wait do (`sparing.rs`): a search that is quicker where it finds a run, and shows nothing
+//! where it does not.
 
 pub mod automaton;
 mod product;
 pub mod search;
 mod shortest;
+mod sparing;

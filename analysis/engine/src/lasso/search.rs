@@ -14,6 +14,7 @@ use std::time::{Duration, Instant};
 use super::automaton::Automaton;
 use super::product::Product;
 use super::shortest::Lasso;
+use super::sparing::Sparing;
 use crate::budget::{Found, Memory, Stop, Watch};
 use crate::marking::Width;
 use crate::random::Random;
@@ -34,6 +35,8 @@ pub struct Limits {
     pub time: Option<Duration>,
     /// The seed of a drawn order of firings; none for the order of the net.
     pub seed: Option<u64>,
+    /// Whether firings that can wait do (`sparing.rs`): then nothing is concluded from finding no run.
+    pub sparing: bool,
 }
 
 /// What a search found.
@@ -51,15 +54,17 @@ pub struct Outcome {
     pub seconds: f64,
 }
 
-/// A vertex on the way: its edges of the automaton and its firable transitions as ranges of two stacks, and how far these
-/// were tried.
+/// A vertex on the way: its edges of the automaton and its firable transitions as ranges of two stacks, those of the latter
+/// that are tried now, how far, and whether the rest is tried after them.
 #[derive(Clone, Copy, Debug)]
 struct Frame {
     vertex: u32,
     edges: (usize, usize),
     firable: (usize, usize),
+    now: (usize, usize),
     edge: usize,
     next: usize,
+    all: bool,
 }
 
 /// A component on the way: its first vertex, the marks of the edge into it and those of the edges inside.
@@ -106,6 +111,7 @@ struct Search<'a> {
     /// Transitions that were looked at for one vertex.
     seen: Marks,
     random: Option<Random>,
+    sparing: Option<Sparing<'a>>,
     most: usize,
 }
 
@@ -113,6 +119,7 @@ impl<'a> Search<'a> {
     fn new(prepared: &'a Prepared, automaton: &'a mut Automaton, limits: Limits) -> Result<Self, Stop> {
         let memory = Memory::new(limits.memory_bytes);
         memory.claim(4 * prepared.net.transitions.len())?;
+        let sparing = limits.sparing.then(|| Sparing::new(prepared, automaton, &memory)).transpose()?;
         Ok(Search {
             product: Product::new(prepared, automaton, memory)?,
             frames: Vec::new(),
@@ -122,6 +129,7 @@ impl<'a> Search<'a> {
             firable: Vec::new(),
             seen: Marks::new(prepared.net.transitions.len()),
             random: limits.seed.map(Random::new),
+            sparing,
             most: limits.vertices.clamp(1, NONE as usize),
         })
     }
@@ -164,8 +172,11 @@ impl<'a> Search<'a> {
                 continue;
             };
             watch.tick(1)?;
-            if !self.product.is_closed(known) && self.join(known, marks) == all {
-                return Ok(self.roots.last().map(|root| root.vertex));
+            if !self.product.is_closed(known) {
+                if self.join(known, marks) == all {
+                    return Ok(self.roots.last().map(|root| root.vertex));
+                }
+                self.frames.iter_mut().rev().take(1).for_each(|frame| frame.all = true);
             }
         }
         Ok(None)
@@ -193,13 +204,19 @@ impl<'a> Search<'a> {
                 these.swap(i, random.below(i + 1));
             }
         }
+        let these = &mut self.firable[firable..];
+        let state = vertex[vertex.len() - 1] as usize;
+        let marking = &vertex[..vertex.len() - 1];
+        let first = self.sparing.as_mut().map_or(these.len(), |sparing| sparing.choose(marking, state, these));
         let memory = &self.product.memory;
         let frame = Frame {
             vertex: number,
             edges: (edges, self.edges.len()),
             firable: (firable, self.firable.len()),
+            now: (firable, firable + first),
             edge: edges,
             next: firable,
+            all: false,
         };
         memory.push(&mut self.frames, frame)?;
         memory.push(&mut self.roots, Root { vertex: number, into, marks: 0 })?;
@@ -221,24 +238,30 @@ impl<'a> Search<'a> {
     /// The next firing (`NONE`: the stutter) at the last vertex, with the number of the edge of the automaton.
     fn next(&mut self, vertex: &[u64]) -> Option<(u32, u32)> {
         let frame = self.frames.last_mut()?;
-        let (first, end) = frame.firable;
-        while frame.edge < frame.edges.1 {
-            let number = self.edges[frame.edge];
-            let edge = self.product.edge(vertex, number);
-            while frame.next < end {
-                let t = self.firable[frame.next];
-                frame.next += 1;
-                if edge.admits.has(t) {
-                    return Some((t, number));
+        loop {
+            let (first, end) = frame.now;
+            while frame.edge < frame.edges.1 {
+                let number = self.edges[frame.edge];
+                let edge = self.product.edge(vertex, number);
+                while frame.next < end {
+                    let t = self.firable[frame.next];
+                    frame.next += 1;
+                    if edge.admits.has(t) {
+                        return Some((t, number));
+                    }
+                }
+                frame.next = first;
+                frame.edge += 1;
+                if first == end && edge.stutters {
+                    return Some((NONE, number));
                 }
             }
-            frame.next = first;
-            frame.edge += 1;
-            if first == end && edge.stutters {
-                return Some((NONE, number));
+            if !frame.all || end == frame.firable.1 {
+                return None;
             }
+            frame.now = (end, frame.firable.1);
+            (frame.edge, frame.next) = (frame.edges.0, end);
         }
-        None
     }
 
     /// Appends what is firable at a vertex, ascending, from what was so before `t` fired.
@@ -306,7 +329,7 @@ mod tests {
     }
 
     fn outcome(net: Net, automaton: &mut Automaton, seed: Option<u64>) -> Outcome {
-        let limits = Limits { vertices: 1 << 20, memory_bytes: 1 << 20, time: None, seed };
+        let limits = Limits { vertices: 1 << 20, memory_bytes: 1 << 20, time: None, seed, sparing: false };
         search(&Prepared::new(net), automaton, limits, &mut unwatched)
     }
 
@@ -336,7 +359,7 @@ mod tests {
 
     #[test]
     fn a_budget_of_vertices_or_of_memory_is_a_stop() {
-        let limits = Limits { vertices: 3, memory_bytes: 1 << 20, time: None, seed: None };
+        let limits = Limits { vertices: 3, memory_bytes: 1 << 20, time: None, seed: None, sparing: false };
         let mut automaton = again_and_again(&[5, 0], 6);
         let found = search(&Prepared::new(rings()), &mut automaton, limits, &mut unwatched);
         assert_eq!((found.lasso, found.stop), (None, Some(Stop::Markings)));

@@ -66,8 +66,8 @@ fn edge((label, only, transitions, stutters, target, marks): Row) -> PyResult<Ed
 
 /// Looks for a run that an automaton accepts, depth first.
 #[pyfunction]
-#[pyo3(signature = (n_places, transitions, initial, labels, rows, n_marks, *, seed=None, max_vertices,
-                    max_memory_bytes, max_seconds, cancelled=None))]
+#[pyo3(signature = (n_places, transitions, initial, labels, rows, n_marks, *, seed=None, sparing=false,
+                    max_vertices, max_memory_bytes, max_seconds, cancelled=None))]
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn find_lasso(
     py: Python<'_>,
@@ -78,6 +78,7 @@ pub(crate) fn find_lasso(
     rows: Vec<Vec<Row>>,
     n_marks: u32,
     seed: Option<u64>,
+    sparing: bool,
     max_vertices: usize,
     max_memory_bytes: usize,
     max_seconds: Option<f64>,
@@ -94,7 +95,7 @@ pub(crate) fn find_lasso(
     let count = prepared.net.transitions.len();
     let mut automaton = Automaton::new(labels, rows, n_marks, count).map_err(PyValueError::new_err)?;
     let time = patience.time.map(|time| time.saturating_sub(begun.elapsed()));
-    let limits = Limits { vertices: max_vertices, memory_bytes: max_memory_bytes, time, seed };
+    let limits = Limits { vertices: max_vertices, memory_bytes: max_memory_bytes, time, seed, sparing };
     let mut raised = None;
     let outcome = detached(py, &patience, &mut raised, |poll| search(&prepared, &mut automaton, limits, poll));
     but_ctrl_c(py, raised)?;

@@ -101,12 +101,28 @@ impl<'a> Closure<'a> {
 
     /// Goes to a marking.
     pub fn start(&mut self, marking: &[u64]) {
+        self.leave();
+        self.net.all_firable(marking, &mut self.firable);
+        self.begin();
+    }
+
+    /// Goes to a marking at which these are the firable transitions.
+    pub fn start_from(&mut self, firable: &[u32]) {
+        self.leave();
+        self.firable.clear();
+        self.firable.extend(firable);
+        self.begin();
+    }
+
+    fn leave(&mut self) {
         for &t in &self.firable {
             for &l in self.net.flipped(t) {
                 self.makers_firable[negation(l) as usize] = 0;
             }
         }
-        self.net.all_firable(marking, &mut self.firable);
+    }
+
+    fn begin(&mut self) {
         self.is_firable.clear();
         for &t in &self.firable {
             self.is_firable.insert(t);
@@ -171,6 +187,18 @@ impl<'a> Closure<'a> {
 
     /// Closes the makers of some literals and some more transitions, and keeps the set if it fires fewer than the best.
     pub fn consider(&mut self, marking: &[u64], literals: &[Literal], transitions: &[u32], thorough: bool) {
+        self.consider_unless(marking, literals, transitions, thorough, |_| false);
+    }
+
+    /// The same; a set in which one that is firable is `barred` is not kept.
+    pub fn consider_unless(
+        &mut self,
+        marking: &[u64],
+        literals: &[Literal],
+        transitions: &[u32],
+        thorough: bool,
+        barred: impl Fn(u32) -> bool,
+    ) {
         self.now.clear();
         self.needers_in.clear();
         self.makers_in.clear();
@@ -184,6 +212,9 @@ impl<'a> Closure<'a> {
         }
         while self.now.firable.len() < self.best.firable.len() {
             if let Some(t) = self.open_firable.pop() {
+                if barred(t) {
+                    return;
+                }
                 self.work += 1;
                 for &l in self.net.flipped(t) {
                     self.take_needers(l);
