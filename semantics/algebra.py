@@ -60,11 +60,16 @@ class Bitwise(Generic[B]):
 
 
 class Booleans:
-    """The algebra of Python's own Booleans, which looks no further once the value is known."""
+    """The algebra of Python's own Booleans, which looks no further once the value is known, and counts by itself."""
 
     conjunction = staticmethod(all)
     disjunction = staticmethod(any)
     negation = staticmethod(not_)
+
+    @staticmethod
+    def at_most(terms: Iterable[tuple[bool, int]], bound: int, /) -> bool:
+        """Whether the weights of the terms that are true sum up to at most the bound."""
+        return sum(weight for term, weight in terms if term) <= bound
 
 
 BOOL: Final = Booleans()

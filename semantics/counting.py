@@ -14,7 +14,7 @@ comparison written out as a state formula, which has no sharing and grows as a b
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol, TypeVar, runtime_checkable
+from typing import Protocol, TypeVar
 
 from firable.nets.formula import Compare, Sign
 from firable.nets.net import Net
@@ -24,7 +24,6 @@ from firable.semantics.firing import Valuation
 B = TypeVar("B")
 
 
-@runtime_checkable
 class CountingAlgebra(BooleanAlgebra[B], Protocol[B]):
     """A Boolean algebra that counts faster than by the table of this module."""
 
@@ -87,8 +86,8 @@ def at_most(
         return algebra.disjunction([])
     if bound >= total:
         return algebra.conjunction([])
-    if isinstance(algebra, CountingAlgebra):
-        counted: B = algebra.at_most(terms, bound)
+    if (counting := getattr(algebra, "at_most", None)) is not None:  # to ask for the protocol takes longer than to count
+        counted: B = counting(terms, bound)
         return counted
     # Which remaining bounds are met before each term, first to last; then their values, last to first.
     met: list[set[int]] = [{bound}]
