@@ -55,7 +55,8 @@ from firable.analysis.temporal.queries import as_goal, question_of, temporal_que
 from firable.analysis.verdicts.behaviour import DEADLOCK_FREE, QUESTIONS
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.net import Net, TemporalProperty
-from firable.nets.queries import Query
+from firable.nets.temporal import Logic
+from firable.nets.queries import Query, QueryKind
 from firable.nets.verdict import Cost, Status, Verdict, spelled
 from firable.semantics.trace import Discipline
 
@@ -90,7 +91,8 @@ _DEADLOCK_LANES: Final = ((Method.REDUCTION, Method.WALK, Method.STATE_EQUATION)
 _FIRST_LANES: Final = ((Method.REDUCTION, Method.WALK), (Method.STATE_EQUATION, Method.PARIKH), *FORMULA_LANES)
 _FIRST_SLICES_SECONDS: Final = (3.0, 10.0)
 _STATED_SHARE: Final = 0.5  # of the time, for what is stated and easy
-_FORMULAS_SHARE: Final = 0.25  # of the time that is left, for formulas without sets of markings
+_FORMULAS_SHARES: Final = {Logic.LTL: 0.5, Logic.CTL: 0.25}
+"""The parts of the time left for formulas without sets of markings, which decide more of CTL than of LTL."""
 _FORMULA_SECONDS_MAX: Final = 1.0  # for each of them
 
 _Contestant: TypeAlias = Contestant[StateSpace[Any]]
@@ -181,7 +183,7 @@ class _Check:
         settling = self._settling()
         if first.complete or first.engine.reason == "interrupted":
             if first.complete and first.n_markings > FEW_MARKINGS:
-                settling.follow_runs(self.deadline.share(_FORMULAS_SHARE), FOLLOWED_VERTICES)
+                settling.follow_runs(self.deadline.share(_FORMULAS_SHARES[Logic.LTL]), FOLLOWED_VERTICES)
             return self._explored(first, settling.found)
         course = [f"the first {first.n_markings:,} markings are not all"]
         ends: dict[str, ReachabilityGraph] = {}
@@ -237,7 +239,7 @@ class _Check:
         for of, part in FIRST_KNOWERS.items() if self.of_the_net else ():
             settling.learn(of, _LEARNT_FIRST, _moment(deadline, part))
         # What else is hard waits for the processors, which the search for all markings has.
-        settling.ask_in_turns(map(_asked_of, self._formulas()), (), FORMULA_LANES, deadline, _FIRST_SLICES_SECONDS)
+        settling.ask_in_turns(map(_asked_of, self._formulas(*Logic)), (), FORMULA_LANES, deadline, _FIRST_SLICES_SECONDS)
         if self.of_the_net:
             settling.ask(_asked_of(DEADLOCK_FREE), (), _DEADLOCK_LANES, deadline, _FIRST_SLICES_SECONDS)
         is_all = not self.of_the_net and len(self._temporal) == len(self.net.properties)
@@ -248,18 +250,21 @@ class _Check:
     def _temporal(self) -> list[TemporalProperty]:
         return [of for of in self.net.properties if isinstance(of, TemporalProperty)]
 
-    def _formulas(self) -> list[Question]:
-        """The formulas that do not come down to goals."""
-        stated = [temporal_question(of) for of in self._temporal if not as_goal(of.formula)]
-        asked = [question_of(query) for query in self.queries if query.formula and not as_goal(query.formula)]
-        return [*stated, *asked]
+    def _formulas(self, *logics: Logic) -> list[Question]:
+        """The formulas of these logics that do not come down to goals."""
+        stated = [of for of in self._temporal if of.logic in logics and not as_goal(of.formula)]
+        kinds = {QueryKind(logic) for logic in logics}
+        queries = [of for of in self.queries if of.formula and of.kind in kinds and not as_goal(of.formula)]
+        return [*map(temporal_question, stated), *map(question_of, queries)]
 
     def _ask_formulas(self, settling: Settling) -> None:
         """Settle the formulas that do not come down to goals, one after the other, as far as that is quick."""
-        asked, share = self._formulas(), self.deadline.share(_FORMULAS_SHARE)
-        for later, question in zip(range(len(asked), 0, -1), asked, strict=True):
-            turn = share.share(1 / later).within(_FORMULA_SECONDS_MAX)
-            settling.ask(_asked_of(question), (), FORMULA_LANES, turn, None)
+        for logic, share in _FORMULAS_SHARES.items():
+            asked = [of for of in self._formulas(logic) if of.name not in settling.found]
+            until = self.deadline.share(share)
+            for later, question in zip(range(len(asked), 0, -1), asked, strict=True):
+                turn = until.share(1 / later).within(_FORMULA_SECONDS_MAX)
+                settling.ask(_asked_of(question), (), FORMULA_LANES, turn, None)
 
     def by(self, method: Method) -> CheckReport:
         """The report of one technique: what it does not decide stays unknown."""

@@ -7,14 +7,15 @@ Sörensson 2006, "Translating pseudo-Boolean constraints into SAT": decision dia
 is negative, or as large as what can still come, is a constant, so the table has at most places times
 min(bound, places - bound) entries, and a decision diagram made from it is one of that size.
 
-An algebra that can count by itself, such as the columns of a state space, says so by a method `at_most`. Rejected: the
+An algebra that can count by itself, such as Python's Booleans and the columns of a state space, says so by a method
+`at_most` of the same terms and bound. Rejected: the
 comparison written out as a state formula, which has no sharing and grows as a binomial coefficient.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 from firable.nets.formula import Compare, Sign
 from firable.nets.net import Net
@@ -22,14 +23,6 @@ from firable.semantics.algebra import BooleanAlgebra
 from firable.semantics.firing import Valuation
 
 B = TypeVar("B")
-
-
-class CountingAlgebra(BooleanAlgebra[B], Protocol[B]):
-    """A Boolean algebra that counts faster than by the table of this module."""
-
-    def at_most(self, terms: Sequence[tuple[B, int]], bound: int, /) -> B:
-        """Where the weights of the terms that are true sum up to at most the bound."""
-        ...
 
 
 def compared(algebra: BooleanAlgebra[B], net: Net, comparison: Compare, holds: Valuation[B]) -> B:
