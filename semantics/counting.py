@@ -8,8 +8,8 @@ is negative, or as large as what can still come, is a constant, so the table has
 min(bound, places - bound) entries, and a decision diagram made from it is one of that size.
 
 An algebra that can count by itself, such as Python's Booleans and the columns of a state space, says so by a method
-`at_most` of the same terms and bound. Rejected: the
-comparison written out as a state formula, which has no sharing and grows as a binomial coefficient.
+`at_most` of the same terms and bound. Rejected: the comparison written out as a state formula, which has no sharing and
+grows as a binomial coefficient.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from firable.analysis.check import check
 from firable.analysis.compiled import flat, nodes_of
 from firable.analysis.deadline import Deadline
 from firable.analysis.goal import Limits
-from firable.analysis.reduction.reduce import reduce_for_runs
+from firable.analysis.reduction.reduce import facts_on, reduce_for_runs
 from firable.analysis.spaces.reachability import Budget, explore
 from firable.analysis.temporal.automaton import automaton_of
 from firable.analysis.temporal.lasso import Run, satisfies, witness_of
@@ -112,6 +112,17 @@ def test_in_the_reduced_net_what_happens_side_by_side_is_told_apart_as_over_sets
     assert None not in held
     assert 0.2 < held.count(True) / len(held) < 0.8
     assert reduced > 30
+
+
+def test_facts_that_were_proved_for_all_formulas_reduce_as_those_that_are_proved_for_one() -> None:
+    nets = [family_net(name) for name in ("pipeline-8", "slotted_ring-3", "interlocked-4")]
+    nets += [block_net(random.Random(seed), depth=4) for seed in seeds(20)]
+    for net in nets:
+        facts, labels = facts_on(net, Limits()), [Holds(net.places[0].name)]
+        assert facts is not None
+        with_facts, without = reduce_for_runs(net, labels, Limits(), facts), reduce_for_runs(net, labels)
+        assert with_facts.net.places == without.net.places
+        assert len(with_facts.net.transitions) == len(without.net.transitions)
 
 
 def test_a_run_into_a_deadlock_of_the_reduced_net_goes_on_in_the_net_until_it_is_one_there() -> None:
