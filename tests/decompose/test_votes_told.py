@@ -72,8 +72,9 @@ def test_where_arcs_settle_all_no_marking_is_looked_at() -> None:
 
 
 def test_a_vote_that_arcs_settle_is_told_from_one_that_a_unit_settles() -> None:
-    methods = {verdict.name: verdict.method for verdict in persistence(split(BY_A_UNIT)).verdicts}
-    assert methods == {
+    verdicts = persistence(split(BY_A_UNIT)).verdicts
+    assert {verdict.discipline for verdict in verdicts} == {"interleaving"}
+    assert {verdict.name: verdict.method for verdict in verdicts} == {
         "persistent.t1-11": "arcs and sets of places with one token at most",
         "persistent.t2-12": "arcs: no other transition can take it back",
     }
@@ -156,6 +157,8 @@ def test_a_walk_accuses_whom_it_has_met(monkeypatch: pytest.MonkeyPatch) -> None
     assert verdict.subjects == ("l",)
     assert verdict.witness is not None
     assert verdict.witness.firings == (("l",),)
+    assert verdict.witness.note == "before the last firing 't1-11' votes yes, after it no"
+    assert verdict.hint == "nothing has to be done: the part promises, and then l cannot take its yes back"
 
 
 def deciding(net: Net) -> module._Deciding:
