@@ -55,8 +55,8 @@ from firable.analysis.temporal.queries import as_goal, question_of, temporal_que
 from firable.analysis.verdicts.behaviour import DEADLOCK_FREE, QUESTIONS
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.net import Net, TemporalProperty
-from firable.nets.temporal import Logic
 from firable.nets.queries import Query, QueryKind
+from firable.nets.temporal import Logic
 from firable.nets.verdict import Cost, Status, Verdict, spelled
 from firable.semantics.trace import Discipline
 
@@ -239,7 +239,9 @@ class _Check:
         for of, part in FIRST_KNOWERS.items() if self.of_the_net else ():
             settling.learn(of, _LEARNT_FIRST, _moment(deadline, part))
         # What else is hard waits for the processors, which the search for all markings has.
-        settling.ask_in_turns(map(_asked_of, self._formulas(*Logic)), (), FORMULA_LANES, deadline, _FIRST_SLICES_SECONDS)
+        settling.ask_in_turns(
+            map(_asked_of, self._formulas(*Logic)), (), FORMULA_LANES, deadline, _FIRST_SLICES_SECONDS
+        )
         if self.of_the_net:
             settling.ask(_asked_of(DEADLOCK_FREE), (), _DEADLOCK_LANES, deadline, _FIRST_SLICES_SECONDS)
         is_all = not self.of_the_net and len(self._temporal) == len(self.net.properties)

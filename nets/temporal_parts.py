@@ -83,6 +83,4 @@ def has_next(formula: Temporal) -> bool:
     >>> has_next(parse_temporal("G (p -> F X q)")), has_next(parse_temporal("G (p -> F q)"))
     (True, False)
     """
-    return not isinstance(formula, Formula) and (
-        isinstance(formula, Next) or any(map(has_next, operands_of(formula)))
-    )
+    return not isinstance(formula, Formula) and (isinstance(formula, Next) or any(map(has_next, operands_of(formula))))

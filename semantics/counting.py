@@ -79,7 +79,8 @@ def at_most(
         return algebra.disjunction([])
     if bound >= total:
         return algebra.conjunction([])
-    if (counting := getattr(algebra, "at_most", None)) is not None:  # to ask for the protocol takes longer than to count
+    counting = getattr(algebra, "at_most", None)  # to look for a protocol takes longer than to count
+    if counting is not None:
         counted: B = counting(terms, bound)
         return counted
     # Which remaining bounds are met before each term, first to last; then their values, last to first.

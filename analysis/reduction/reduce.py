@@ -35,6 +35,7 @@ from firable.semantics.formulas import evaluate
 from firable.semantics.player import holds_in
 from firable.semantics.trace import Discipline
 
+
 @dataclass(frozen=True, kw_only=True)
 class _WithRuns:
     """A smaller net whose runs stand for runs of the `original` one, under interleaving, external gates free.
@@ -206,11 +207,11 @@ def reduce_for_runs(
 ) -> ReducedRuns:
     """Reduce a net, keeping for each maximal run one that goes through the same values of some state formulas.
 
-    A maximal run goes on for ever or ends in a deadlock; how long one stays with each value is not kept. So a formula of
-    LTL over these that has no X holds in the one net if and only if it holds in the other (Poitrenaud and Pradat-Peyre
-    2000, "Pre- and post-agglomerations for LTL model checking"). The rules are those that keep deadlocks, which look
-    besides that no move is put off or made early that changes a label: so their proofs, which put firings in another
-    order, are of infinite runs too. What they add to such a run or leave out of it is one firing that changes no label.
+    A maximal run goes on for ever or ends in a deadlock; how long one stays with each value is not kept. So a formula
+    of LTL over these that has no X holds in the one net if and only if it holds in the other (Poitrenaud and
+    Pradat-Peyre 2000, "Pre- and post-agglomerations for LTL model checking"). The rules are those that keep deadlocks,
+    which look besides that no move is put off or made early that changes a label: so their proofs, which put firings in
+    another order, are of infinite runs too. What they add to such a run or leave out is one firing that changes none.
 
     Cost: as of `reduce_for_goal`; of large nets less than half of it with `facts_on` them.
 

@@ -28,8 +28,8 @@ from firable.analysis._engine import BudgetExceeded, IncompleteGraph, Lasso, fin
 from firable.analysis.compiled import Flat, Node, engine_limits, flat, nodes_of
 from firable.analysis.goal import Limits
 from firable.analysis.question import Known, no, yes
-from firable.analysis.reduction.reduce import ReducedRuns, facts_on, reduce_for_runs
 from firable.analysis.reduction.pairs import Pairs
+from firable.analysis.reduction.reduce import ReducedRuns, facts_on, reduce_for_runs
 from firable.analysis.spaces.reachability import REASONS
 from firable.analysis.spaces.space import WitnessError
 from firable.analysis.temporal.automaton import Automaton, Edge, TimeEndedError, TooLargeError, automaton_of
@@ -62,8 +62,9 @@ _BUDGETS: Final = (2**14, 2**18, 2**22)
 class Turn(NamedTuple):
     """A search: the seed of its order, None for that of the net, and how many vertices it may meet.
 
-    One that is `reduced` looks in the net reduced for the formula, and tells that there is no run only where the formula
-    does not tell runs apart that stutter. One that is `sparing` leaves out firings that can wait; it cannot tell that.
+    One that is `reduced` looks in the net reduced for the formula, and tells that there is no run only where the
+    formula does not tell runs apart that stutter. One that is `sparing` leaves out firings that can wait; it cannot
+    tell that.
     """
 
     seed: int | None
@@ -134,9 +135,7 @@ class _Search:
     The automaton `stutters` where it does not matter to it how long a run stays with the same values of the atoms.
     """
 
-    def __init__(
-        self, net: Net, formula: Temporal, automaton: Automaton, reducer: _Reducer, *, stutters: bool
-    ) -> None:
+    def __init__(self, net: Net, formula: Temporal, automaton: Automaton, reducer: _Reducer, *, stutters: bool) -> None:
         self.net, self.formula, self.automaton, self.stutters = net, formula, automaton, stutters
         self._reducer = reducer
         self.vertices = self.edges = 0
