@@ -22,14 +22,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph, Lasso, find_lasso
 from firable.analysis.compiled import Flat, Node, engine_limits, flat, nodes_of
 from firable.analysis.goal import Limits
 from firable.analysis.question import Known, no, yes
-from firable.analysis.reduction.pairs import Pairs
-from firable.analysis.reduction.reduce import ReducedRuns, facts_on, reduce_for_runs
 from firable.analysis.spaces.reachability import REASONS
 from firable.analysis.spaces.space import WitnessError
 from firable.analysis.temporal.automaton import Automaton, Edge, TimeEndedError, TooLargeError, automaton_of
@@ -42,6 +40,10 @@ from firable.nets.temporal import Temporal, negated
 from firable.nets.temporal_parts import has_next
 from firable.nets.verdict import Cost
 from firable.semantics.trace import Discipline
+
+if TYPE_CHECKING:
+    from firable.analysis.reduction.pairs import Pairs
+    from firable.analysis.reduction.reduce import ReducedRuns
 
 METHOD: Final = "on the fly"
 MARKS_MAX: Final = 64
@@ -246,6 +248,8 @@ class _Reducer:
 
         Raises `BudgetExceeded` where the deadline comes before the net is read.
         """
+        from firable.analysis.reduction.reduce import facts_on, reduce_for_runs  # with numpy, where first needed
+
         if self._facts is None:
             self._facts = facts_on(self.net, limits)
         return reduce_for_runs(self.net, atoms, limits, self._facts)
