@@ -92,7 +92,8 @@ _FIRST_LANES: Final = ((Method.REDUCTION, Method.WALK), (Method.STATE_EQUATION, 
 _FIRST_SLICES_SECONDS: Final = (3.0, 10.0)
 _STATED_SHARE: Final = 0.5  # of the time, for what is stated and easy
 _FORMULAS_SHARES: Final = {Logic.LTL: 0.5, Logic.CTL: 0.25}
-"""The parts of the time left for formulas without sets of markings, which decide more of CTL than of LTL."""
+"""The parts of the time left for formulas before sets of markings, which decide more of CTL than of LTL."""
+_FOLLOWED_SHARE: Final = 0.25  # of the time that is left, for runs where all markings are there
 _FORMULA_SECONDS_MAX: Final = 1.0  # for each of them
 
 _Contestant: TypeAlias = Contestant[StateSpace[Any]]
@@ -183,7 +184,7 @@ class _Check:
         settling = self._settling()
         if first.complete or first.engine.reason == "interrupted":
             if first.complete and first.n_markings > FEW_MARKINGS:
-                settling.follow_runs(self.deadline.share(_FORMULAS_SHARES[Logic.LTL]), FOLLOWED_VERTICES)
+                settling.follow_runs(self.deadline.share(_FOLLOWED_SHARE), FOLLOWED_VERTICES)
             return self._explored(first, settling.found)
         course = [f"the first {first.n_markings:,} markings are not all"]
         ends: dict[str, ReachabilityGraph] = {}

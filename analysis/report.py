@@ -23,7 +23,7 @@ from firable.analysis.goal import Finding
 from firable.analysis.question import Answer, Question
 from firable.analysis.spaces.reachability import BudgetExceeded, IncompleteGraph, ReachabilityGraph
 from firable.analysis.spaces.space import StateSpace, WitnessError
-from firable.analysis.temporal.queries import answer, decide_temporal
+from firable.analysis.temporal.queries import answer, as_goal, decide_temporal
 from firable.analysis.verdicts import behaviour as behaviour_of
 from firable.analysis.verdicts import conflicts as conflict
 from firable.analysis.verdicts.behaviour import Behaviour
@@ -231,11 +231,12 @@ def _even_share(deadline: Deadline, later: int) -> float:
 
 
 def _formulas(net: Net, queries: Sequence[Query], known: Mapping[str, Verdict]) -> int:
-    """How many formulas of CTL, stated or asked, are not known."""
+    """How many formulas of CTL, stated or asked, are not known and need more than the markings of a goal."""
     stated = (of for of in net.properties if isinstance(of, TemporalProperty) and of.logic is Logic.CTL)
     asked = (query for query in queries if query.kind is QueryKind.CTL)
-    names = [*(f"property.{of.name}" for of in stated), *(f"query.{query.name}" for query in asked)]
-    return sum(name not in known for name in names)
+    named = [*((f"property.{of.name}", of.formula) for of in stated)]
+    named += [(f"query.{query.name}", query.formula) for query in asked if query.formula is not None]
+    return sum(name not in known and as_goal(formula) is None for name, formula in named)
 
 
 def _shows(

@@ -307,7 +307,10 @@ class ReachabilityGraph(Derived["Column"]):
         return [(tuple(fired), target) for fired, target in self.engine.successors(index, **self._limits)]
 
     def expect(self, formulas: int) -> None:
-        """Get ready for so many formulas of CTL, where they come to more than that takes and it is done in time."""
+        """Get ready for so many formulas of CTL, where they come to more than that takes.
+
+        What is not ready when the turn ends is given up.
+        """
         with suppress(BudgetExceeded):
             self.engine.expect(formulas, **self._limits)
 

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from time import perf_counter
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph, Lasso, find_lasso
@@ -98,7 +99,7 @@ def decide_ltl_on_the_fly(net: Net, formula: Temporal, limits: Limits, *, turns:
 
 
 class LtlOnTheFly:
-    """Formulas of LTL on one net; one that is asked again goes on where it was ended."""
+    """Formulas of LTL on one net; one that is asked again is not searched again as it was searched in vain."""
 
     def __init__(self, net: Net) -> None:
         self.net = net
@@ -118,7 +119,7 @@ class LtlOnTheFly:
             self._searches[formula] = _Search(
                 self.net, formula, automaton, self._reducer, stutters=not has_next(refuting)
             )
-        return self._searches[formula].known(turns or _turns(), limits)
+        return self._searches[formula].known(_turns() if turns is None else turns, limits)
 
 
 def _turns() -> Iterator[Turn]:
@@ -148,12 +149,16 @@ class _Search:
 
     def known(self, turns: Iterable[Turn], limits: Limits) -> Known:
         """What the first turn says that decides it; those that did not are not tried again."""
+        reduced, full, ended = self._small, set[Turn](), ""
         for turn in turns:
-            small = self._reduced(limits) if turn.reduced and turn not in self._in_vain else None
-            if turn in self._in_vain or (turn.reduced and small is None):
+            kind = turn._replace(vertices=0)
+            if not {turn, kind}.isdisjoint(self._in_vain | full):
                 continue
+            if turn.reduced and (reduced := reduced or self._reduced(limits)) is None:
+                continue
+            small = reduced if turn.reduced else None
             found = self._found(small[1] if small else self._whole, turn, limits)
-            if not found.complete and found.reason != "markings":
+            if not found.complete and found.reason not in {"markings", "memory"}:
                 reason = REASONS.get(found.reason or "", found.reason)
                 raise IncompleteGraph(f"{found.n_vertices:,} pairs of a marking and a state of the automaton: {reason}")
             if found.run is not None and small:
@@ -166,9 +171,12 @@ class _Search:
                 return self._refuted(run, METHOD)
             elif found.complete and not turn.sparing and (small is None or self.stutters):
                 return Known(yes(), f"{METHOD}, after {small[0].summary}" if small else METHOD, self._cost)
-            if not turn.reduced or self._small is not None:
-                self._in_vain.add(turn)
-        raise IncompleteGraph(f"{self.vertices:,} pairs of a marking and a state of the automaton")
+            if found.reason == "memory":  # others may need less, and another time there may be more
+                full.add(kind)
+                ended = f": {REASONS['memory']}"
+            elif small is None or small is self._small:  # one that has seen all sees no more with a larger budget
+                self._in_vain.add(kind if found.complete else turn)
+        raise IncompleteGraph(f"{self.vertices:,} pairs of a marking and a state of the automaton{ended}")
 
     @property
     def _cost(self) -> Cost:
@@ -202,7 +210,7 @@ class _Search:
         if left is not None and _REDUCING_SHARE * left < self._reducer.takes_seconds:
             return None
         atoms = sorted({atom for edge in edges for atom in edge.atoms}, key=repr)
-        within = replace(limits, deadline=limits.deadline.share(_REDUCING_SHARE))
+        within, began = replace(limits, deadline=limits.deadline.share(_REDUCING_SHARE)), perf_counter()
         try:
             reduced = self._reducer.reduced(atoms, within)
         except BudgetExceeded:
@@ -213,6 +221,7 @@ class _Search:
         ]
         small = reduced, _compiled(reduced.net, replace(self.automaton, edges=tuple(rows)))
         self._small = None if within.deadline.over else small
+        self.seconds += perf_counter() - began
         return small
 
     def _lifted(self, reduced: ReducedRuns, run: tuple[list[int], list[int]]) -> Run | None:
@@ -236,11 +245,12 @@ class _Reducer:
     def __init__(self, net: Net) -> None:
         self.net = net
         self._facts: Pairs | None = None
+        self._are_facts_tried = False
 
     @property
     def takes_seconds(self) -> float:
         """About how long the next reduction takes."""
-        each = _PROVING_SECONDS if self._facts is None else 0.0
+        each = 0.0 if self._are_facts_tried else _PROVING_SECONDS
         return (each + _REDUCING_SECONDS) * (len(self.net.places) + len(self.net.transitions))
 
     def reduced(self, atoms: Sequence[Formula], limits: Limits) -> ReducedRuns:
@@ -250,8 +260,9 @@ class _Reducer:
         """
         from firable.analysis.reduction.reduce import facts_on, reduce_for_runs  # with numpy, where first needed
 
-        if self._facts is None:
+        if not self._are_facts_tried:
             self._facts = facts_on(self.net, limits)
+            self._are_facts_tried = self._facts is not None or not limits.deadline.over
         return reduce_for_runs(self.net, atoms, limits, self._facts)
 
 

@@ -150,6 +150,30 @@ def test_who_is_asked_again_goes_on_where_it_was_ended() -> None:
     assert "no rule" not in known.method  # what time had ended was not kept
 
 
+def test_a_search_that_memory_ends_is_no_end_for_one_in_the_reduced_net() -> None:
+    net = family_net("machines-14")
+    first = net.transitions[0]
+    formula = parse_temporal(f'G ("{first.inputs[0]}" or "{first.outputs[0]}")')
+    limits = Limits(memory_bytes=200_000)
+    with pytest.raises(IncompleteGraph, match="memory"):
+        decide_ltl_on_the_fly(net, formula, limits, turns=[FIXED])
+    found = decide_ltl_on_the_fly(net, formula, limits, turns=[FIXED, REDUCED])
+    assert found.answer.holds
+    assert "reduction" in found.method
+
+
+def test_a_search_that_has_seen_all_in_vain_is_not_tried_with_a_larger_budget() -> None:
+    net = family_net("machines-4")
+    on_the_fly = LtlOnTheFly(net)
+    held = parse_temporal(f'X X ("{net.places[0].name}" or not "{net.places[0].name}")')
+    turns = [Turn(None, 2**most, sparing=True) for most in (10, 12, 14)]
+    with pytest.raises(IncompleteGraph) as once:
+        on_the_fly(held, Limits(), turns=turns[:1])
+    with pytest.raises(IncompleteGraph) as again:
+        on_the_fly(held, Limits(), turns=turns)
+    assert str(once.value) == str(again.value)
+
+
 @pytest.mark.parametrize("turn", [SPARING, SPARING_DRAWN, SPARING_REDUCED])
 @examples(15)
 @given(st.data(), st.one_of(ring_nets(), lively_nets(), dense_nets(signals=True)))

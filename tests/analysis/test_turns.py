@@ -109,6 +109,7 @@ def test_formulas_of_ctl_that_are_not_known_are_counted() -> None:
     )
     net = replace(net, properties=stated)
     queries = [Query(name, QueryKind.CTL, parse_temporal("EG start")) for name in ("c", "d")]
+    queries += [Query("goal", QueryKind.CTL, parse_temporal("EF deadlock")), Query("e", QueryKind.LIVE)]
     assert _formulas(net, queries, {}) == 3
     known = Question("query.c", "c").settle(yes(), "", Discipline.INTERLEAVING, Cost())
     assert _formulas(net, queries, {known.name: known}) == 2

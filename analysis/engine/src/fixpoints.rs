@@ -5,8 +5,9 @@
 //! exploration did; fifty times as much where many transitions differ only in what they ask before, as those of a cell with
 //! its machines do, because most of what they come from was never reached. So who asks again and again counts what was
 //! tried, and before that comes to more than it costs to store the edges, in the middle of a search or between two, or
-//! before the first if it is said that many follow, they are stored (`Against`): turned round, where a search stays in a set, and costs some ten nanoseconds an edge then; or as
-//! those of the components, where it goes anywhere (`Condensed`), and costs two or three.
+//! before the first if it is said that many follow, they are stored (`Against`): turned round, where a search stays in a
+//! set, and costs some ten nanoseconds an edge then; or as those of the components, where it goes anywhere
+//! (`Condensed`), and costs two or three.
 //!
 //! One step back is asked from whichever side is smaller: the predecessors of few targets are computed, and of many, each
 //! marking looks for one edge into them, of which it usually finds one at once.
