@@ -71,7 +71,6 @@ class Labels:
 
     formulas: tuple[Formula, ...]
     deadlock: ClassVar = True
-    is_false: ClassVar = False
 
     def literals(self) -> Iterator[tuple[str, bool]]:
         """The places that they speak of, with both values."""

@@ -309,7 +309,7 @@ class ReachabilityGraph(Derived["Column"]):
     def expect(self, formulas: int) -> None:
         """Get ready for so many formulas of CTL, where they come to more than that takes.
 
-        What is not ready when the turn ends is given up.
+        What is not ready when the turn ends is given up. Raises `IncompleteGraph`.
         """
         with suppress(BudgetExceeded):
             self.engine.expect(formulas, **self._limits)

@@ -122,7 +122,10 @@ class StateSpace(Protocol[S]):
         ...
 
     def expect(self, formulas: int) -> None:
-        """Get ready for so many formulas of CTL, if the space is whole and that takes less than they would without."""
+        """Get ready for so many formulas of CTL, where they come to more than that takes.
+
+        Raises `IncompleteGraph` where the space is not whole.
+        """
         ...
 
     def require_complete(self) -> None:

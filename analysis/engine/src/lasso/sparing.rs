@@ -42,6 +42,7 @@ impl<'a> Sparing<'a> {
         memory.claim(Closure::bytes(net.places, count))?;
         memory.claim(4 * count * automaton.rows.len())?;
         let seen = automaton.rows.iter().map(|_| Marks::new(count));
+        let mut labels = Marks::new(automaton.labels.len());
         let mut sparing = Sparing {
             closure: Closure::new(dependencies, net.places, count),
             seen: seen.collect(),
@@ -49,10 +50,14 @@ impl<'a> Sparing<'a> {
             literals: Vec::new(),
         };
         for (state, seen) in sparing.seen.iter_mut().enumerate() {
+            labels.clear();
             for later in entered(automaton, state) {
                 for edge in &automaton.rows[later] {
                     let (Admits::Only(these) | Admits::AllBut(these)) = &edge.admits;
                     these.iter().for_each(|&t| _ = seen.insert(t));
+                    if !labels.insert(edge.label) {
+                        continue;
+                    }
                     for node in automaton.labels[edge.label as usize].nodes() {
                         if let &Node::Literal(l) = node {
                             let changing = dependencies.makers.of(l).iter().chain(dependencies.makers.of(negation(l)));
