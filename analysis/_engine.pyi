@@ -37,6 +37,24 @@ def flat(
     It keeps the interpreter, about a microsecond for each transition. Raises `KeyError` for a name without an index.
     """
 
+def pairs_together(
+    n_places: int,
+    transitions: _Transitions,
+    initial: list[int],
+    bound: bytes | None,
+    *,
+    max_words: int,
+    max_seconds: float | None,
+    cancelled: Callable[[], bool] | None = None,
+) -> bytes | None:
+    """Which places may be marked together, by the arcs alone: the structural concurrency relation.
+
+    A row of bits for each place, in little-endian words of 64, end to end; one that may be marked is in its own row.
+    `bound` gives such rows, in which all pairs are known to be. None where more than so many words would be looked at.
+    Contact and external literals are not looked at. A place may stand for a literal, with a firing that takes those
+    that it makes false.
+    """
+
 def explore(
     n_places: int,
     transitions: _Transitions,

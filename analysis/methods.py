@@ -114,8 +114,8 @@ Stubborn sets and projections know what those on the reduced net know, and later
 """
 
 GOALS: Final[dict[Method, Technique[GoalDecider]]] = {
-    Method.REDUCTION: Anew(
-        "stubborn sets and a diagram on the reduced net", "firable.analysis.reduction.deciding:decide_by_reduction"
+    Method.REDUCTION: Technique(
+        "stubborn sets and a diagram on the reduced net", "firable.analysis.reduction.deciding:ByReduction"
     ),
     Method.STATE_EQUATION: Technique("state equation", "firable.analysis.structure.state_equation:StateEquation"),
     Method.PARIKH: Anew("Parikh vectors", "firable.analysis.structure.parikh:decide_by_parikh"),

@@ -395,17 +395,23 @@ def conjuncts(formula: Formula) -> Iterator[Formula]:
             yield formula
 
 
-def names_in(formula: Formula) -> Iterator[Holds | Firable]:
-    """The atoms of the formula that name a place or a transition, left to right."""
+def leaves_in(formula: Formula) -> Iterator[Formula]:
+    """The atoms, comparisons and constants of the formula, left to right."""
     match formula:
-        case Holds() | Firable():
-            yield formula
-        case Compare(left, _, right):
-            yield from map(Holds, (*left.places, *right.places))
         case Not(operand):
-            yield from names_in(operand)
+            yield from leaves_in(operand)
         case And(operands) | Or(operands):
             for operand in operands:
-                yield from names_in(operand)
-        case Constant() | Start() | Deadlock():
-            return
+                yield from leaves_in(operand)
+        case _:
+            yield formula
+
+
+def names_in(formula: Formula) -> Iterator[Holds | Firable]:
+    """The atoms of the formula that name a place or a transition, left to right."""
+    for leaf in leaves_in(formula):
+        match leaf:
+            case Holds() | Firable():
+                yield leaf
+            case Compare(left, _, right):
+                yield from map(Holds, (*left.places, *right.places))

@@ -45,6 +45,23 @@ def atoms_in(formula: Temporal) -> Iterator[Holds | Firable | Fires]:
                 yield from atoms_in(operand)
 
 
+def states_in(formula: Temporal) -> Iterator[Formula]:
+    """The largest state formulas in it, left to right.
+
+    >>> from firable.nets.temporal import parse_temporal
+    >>> list(states_in(parse_temporal("AG (p and EX not q)")))
+    [Holds(place='p'), Not(operand=Holds(place='q'))]
+    """
+    match formula:
+        case Exists(path) | ForAll(path):
+            yield from states_in(path)
+        case _ if isinstance(formula, Formula):
+            yield formula
+        case _:
+            for operand in operands_of(formula):
+                yield from states_in(operand)
+
+
 def with_states(formula: Temporal, changed: Callable[[Formula], Formula]) -> Temporal:
     """The formula with each of its largest state formulas changed.
 
@@ -80,7 +97,12 @@ def has_next(formula: Temporal) -> bool:
     """Whether the formula has the operator X, and so may tell apart how long a run stays with the same values.
 
     >>> from firable.nets.temporal import parse_temporal
-    >>> has_next(parse_temporal("G (p -> F X q)")), has_next(parse_temporal("G (p -> F q)"))
-    (True, False)
+    >>> [has_next(parse_temporal(text)) for text in ("G (p -> F X q)", "AG (p or EX q)", "G (p -> F q)")]
+    [True, True, False]
     """
-    return not isinstance(formula, Formula) and (isinstance(formula, Next) or any(map(has_next, operands_of(formula))))
+    match formula:
+        case Exists(path) | ForAll(path):
+            return has_next(path)
+        case _ if isinstance(formula, Formula):
+            return False
+    return isinstance(formula, Next) or any(map(has_next, operands_of(formula)))

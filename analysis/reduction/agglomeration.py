@@ -28,6 +28,17 @@ the draft may have an opener h that can be made, and leads to a deadlock: no clo
 opener while p is away, and of the others those that need what h brought about are never made then, the rest have not
 gained by h. So h is fired as a *tail*.
 
+**Where it matters what can still happen** (`Labels.branching`), the marking at which a choice is made must not move.
+Then one opener or closer u may go by itself only as far as it makes no difference at all: wherever u can be made, it
+stays possible until it is made, it takes nothing from anybody, and no label sees it. So a marking s in which it can
+be made and the one after it, u(s), satisfy the same formulas of CTL without X: what can be made in u(s) can be made in
+s after u; what can be made in s can be made in u(s), and leads to a pair of the same kind; and u is not made again and
+again, as p is at rest or away between (branching bisimilarity that is sensitive to divergence: De Nicola and Vaandrager
+1995; steps of this kind are the confluent ones of Groote and Sellink 1996). The conditions come to this:
+
+- *closers early*, and there is one closer: of two, which one is made is a choice that openers do not make.
+- *openers late*, and there is one opener, of which no other move flips what it needs: else it is in a choice itself.
+
 Sources: Berthelot 1986, "Checking properties of nets using transformations"; Haddad and Pradat-Peyre 2006, "New
 efficient Petri nets reductions for parallel programs verification"; Thierry-Mieg 2020, "Structural reductions
 revisited" (openers with competitors, if only reachability is asked). All of them assume that places have room. Under
@@ -117,6 +128,7 @@ class _Around:
         away = literal(place, not draft.values[place])
         self.excluded = facts.excluded_by(away)
         self.left = _AROUND_MAX
+        self.branching = isinstance(draft.goal, Labels) and draft.goal.branching
 
     @classmethod
     def of(cls, draft: Draft, facts: Facts, place: int) -> _Around | None:
@@ -153,6 +165,8 @@ class _Around:
 
     def closers_early(self) -> bool:
         """Whether each closer can be made as soon as the place is away, and is missed by nobody."""
+        if self.branching and len(self.closers) > 1:
+            return False
         for move in self.closers.values():
             for one in move.literals:
                 if one // 2 != self.place and not self.excluded(one ^ 1):
@@ -163,6 +177,8 @@ class _Around:
 
     def openers_late(self) -> bool:
         """Whether each opener can be made as late as just before a closer."""
+        if self.branching and not self._single_and_certain():
+            return False
         for lost in self.flipped(self.openers.values()):
             if self.wanted(lost ^ 1) or any(True for _ in self.others(lost ^ 1)):
                 return False
@@ -171,6 +187,15 @@ class _Around:
                 if any(place in other.flips for other in self.others(literal(place, move.needs[place]))):
                     return False
         return not self.draft.deadlock or self._without_competition()
+
+    def _single_and_certain(self) -> bool:
+        """Whether there is one opener, and no other move flips what it needs while the place is at rest."""
+        number, *more = self.openers
+        return not more and not any(
+            one // 2 in self.draft.moves[other].flips
+            for one in self.openers[number].literals
+            for other in self.draft.at[one] - self.closers.keys() - {number}
+        )
 
     def _without_competition(self) -> bool:
         """What late openers must fulfil for deadlocks besides."""

@@ -21,30 +21,42 @@ from firable.analysis.goal import Finding, Limits
 from firable.analysis.question import Known, no
 from firable.analysis.race import Contestant, race
 from firable.analysis.reduction.components import parts
-from firable.analysis.reduction.reduce import ReducedTransitions, reduce_for_goal, reduce_for_liveness
+from firable.analysis.reduction.reduce import ReducedTransitions, reduce_for_liveness
+from firable.analysis.reduction.reducer import Reducer
+from firable.analysis.spaces.reachability import Budget, explore
 from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.analysis.stubborn import FiringSearch, decide_by_stubborn_sets
 from firable.analysis.walk import decide_by_walk
+from firable.nets.diagnostics import InputError
 from firable.nets.formula import Constant, Formula
 from firable.nets.net import Net
 from firable.nets.verdict import Cost
 
 DIAGRAM: Final = "decision diagram"
+EXPLORED: Final = "explored"
 _REDUCING_SHARE: Final = 0.75
 _WALKED_FIRST: Final = 2**18
 _WALKED_BESIDE: Final = 2**28
 """Firings of walks, alone and beside the others, which may have given up before."""
+_EXPLORED_MAX: Final = 2**22
+"""Markings that are explored before walks begin, in so much of the time:"""
+_EXPLORING_SHARE: Final = 0.3
 _ALONE_FIRST: Final = 2**12
 """Markings that stubborn sets search before a diagram is made beside."""
 
 
 def decide_reduced(
-    net: Net, goal: Formula, limits: Limits, decide: Callable[[Net, Formula, Limits], Finding]
+    net: Net,
+    goal: Formula,
+    limits: Limits,
+    decide: Callable[[Net, Formula, Limits], Finding],
+    reducer: Reducer | None = None,
 ) -> Finding:
     """Reduce the net for the goal, let `decide` decide the rest, and lift its witness.
 
-    The method names the rules. A certificate of the small net is not handed on: evidence is made with the steps. Raises
-    `WitnessError` where a witness does not replay on the original net.
+    The `reducer`, if one is given, is of this net, and keeps what it finds. The method names the rules. A certificate
+    of the small net is not handed on: evidence is made with the steps. Raises `WitnessError` where a witness does not
+    replay on the original net.
 
     >>> from firable.nets.catalogue import catalogue_net
     >>> from firable.nets.formula import Deadlock
@@ -55,7 +67,7 @@ def decide_reduced(
     (False, 'structural reduction from 28/15 to 0/0 place')
     """
     try:
-        reduced = reduce_for_goal(net, goal, limits)
+        reduced = (reducer or Reducer(net)).for_goal(goal, limits)
     except BudgetExceeded as error:
         return Finding(None, "structural reduction", bound=str(error))
     if isinstance(reduced.goal, Constant):
@@ -85,18 +97,31 @@ def decide_reduced(
     )
 
 
+class ByReduction:
+    """Goals on one net, each decided on the net reduced for it; what is proved of the net is kept for the next."""
+
+    def __init__(self, net: Net, reducer: Reducer | None = None) -> None:
+        self.net = net
+        self._reducer = reducer or Reducer(net)
+
+    def __call__(self, goal: Formula, limits: Limits) -> Finding:
+        """As `decide_by_reduction`."""
+        return decide_reduced(self.net, goal, limits, _by_all, self._reducer)
+
+
 def decide_by_reduction(net: Net, goal: Formula, limits: Limits) -> Finding:
-    """Decide on the reduced net, by stubborn sets, a decision diagram and random walks, whichever is first.
+    """Decide on the reduced net, by stubborn sets, a decision diagram, exploring and random walks, whichever is first.
 
     Stubborn sets leave out orders of firing that the rules cannot; a diagram holds what is left of nets whose own is
-    too large; and walks come to a goal sooner than in the net itself, as a firing stands for many.
+    too large; where all transitions hang together neither helps, and a million markings are explored in a second; and
+    walks come to a goal sooner than in the net itself, as a firing stands for many.
 
     >>> from firable.nets.catalogue import catalogue_net
     >>> from firable.nets.formula import Deadlock
     >>> decide_by_reduction(catalogue_net("one_robot_mc_late"), Deadlock(), Limits()).cost.markings
     4
     """
-    return decide_reduced(net, goal, limits, _by_all)
+    return ByReduction(net)(goal, limits)
 
 
 def _by_all(net: Net, goal: Formula, limits: Limits) -> Finding:
@@ -109,12 +134,12 @@ def _by_all(net: Net, goal: Formula, limits: Limits) -> Finding:
         first = decide_by_walk(net, goal, limits, firings=_WALKED_FIRST)
     if first.reachable is not None or limits.deadline.over:
         return first
-    deciders: dict[str, Callable[[Net, Formula, Limits], Finding]] = {
-        "stubborn sets": decide_by_stubborn_sets,
-        "diagram": decide_by_diagram,
-        "walk": partial(decide_by_walk, firings=_WALKED_BESIDE),
-    }
-    lanes = [[Contestant(name, partial(_decided, decide, net, goal))] for name, decide in deciders.items()]
+    deciders: list[dict[str, Callable[[Net, Formula, Limits], Finding]]] = [
+        {"stubborn sets": decide_by_stubborn_sets},
+        {"diagram": decide_by_diagram},
+        {"exploring": decide_by_exploring, "walk": partial(decide_by_walk, firings=_WALKED_BESIDE)},
+    ]
+    lanes = [[Contestant(name, partial(_decided, of, net, goal)) for name, of in lane.items()] for lane in deciders]
     of_two = replace(limits, memory_bytes=3 * limits.memory_bytes // 2)  # walks keep nothing, and are given a third
     outcome = race(lanes, of_two, slices_seconds=None)
     why = "the time was over" if limits.deadline.over else "; ".join(outcome.told)
@@ -140,6 +165,24 @@ def decide_by_diagram(net: Net, goal: Formula, limits: Limits) -> Finding:
         return Finding(None, DIAGRAM, bound=str(error), cost=Cost(seconds=perf_counter() - began))
     cost = Cost(space.n_markings, seconds=perf_counter() - began)
     return Finding(reachable, DIAGRAM, witness, cost=cost)
+
+
+def decide_by_exploring(net: Net, goal: Formula, limits: Limits) -> Finding:
+    """Decide whether a marking that satisfies the goal is reachable by exploring all markings, where they are few.
+
+    What was found until the limits are met may hold one, too.
+    """
+    began, budget = perf_counter(), Budget(_EXPLORED_MAX, limits.memory_bytes)
+    try:
+        graph = explore(net, budget=budget, deadline=limits.deadline.share(_EXPLORING_SHARE))
+        graph = graph.until(limits.deadline)
+        witness = graph.witness(graph.satisfying(goal))
+    except InputError as error:  # this part of the memory does not hold the net itself
+        return Finding(None, EXPLORED, bound=error.diagnostics[0].message)
+    except BudgetExceeded as error:
+        return Finding(None, EXPLORED, bound=str(error), cost=Cost(seconds=perf_counter() - began))
+    reachable = True if witness is not None else False if graph.complete else None
+    return Finding(reachable, EXPLORED, witness, graph.bound if reachable is None else "", cost=graph.cost)
 
 
 class KnownByReduction:

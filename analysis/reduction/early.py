@@ -9,6 +9,10 @@ in front: what came before it neither needs nor flips such an x. In a run to the
 put in front, and the marking at the end differs only in that the literals v are false, which the goal does not want.
 A deadlock is not reached without t if all that t needs are the x, because they keep their values.
 
+Where it matters what can still happen (`Labels.branching`), the same holds: nobody can make t impossible, and it takes
+nothing from anybody, so M0 and the marking after t satisfy the same formulas of CTL without X (why, `agglomeration`
+says of such a move).
+
 Contract: a run after t is a run, and it is noted what was fired first.
 
 Each move is fired so at most once, because two that undo each other would do so for ever.

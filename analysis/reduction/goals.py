@@ -14,7 +14,7 @@ helps it, and both where it asks for equality.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from firable.nets.formula import (
@@ -67,9 +67,13 @@ class Goal:
 
 @dataclass(frozen=True, slots=True)
 class Labels:
-    """Formulas over places alone, of which it matters along a maximal run where each is true and where it is not."""
+    """Formulas over places alone, of which it matters along a maximal run where each is true and where it is not.
+
+    Where they are `branching` it matters besides what can still happen wherever a run has come.
+    """
 
     formulas: tuple[Formula, ...]
+    branching: bool = False
     deadlock: ClassVar = True
 
     def literals(self) -> Iterator[tuple[str, bool]]:
@@ -81,7 +85,7 @@ class Labels:
 
     def rewritten(self, values: Mapping[str, Value]) -> Labels:
         """The same with what stands for places in their place."""
-        return Labels(tuple(rewritten(formula, values) for formula in self.formulas))
+        return replace(self, formulas=tuple(rewritten(formula, values) for formula in self.formulas))
 
 
 def goal_of(net: Net, formula: Formula) -> Goal:

@@ -18,13 +18,15 @@ rejected: one-token units (`firable.analysis.structure.cover`) as a first, cheap
 
 A fixpoint that was not reached is no fact at all, so past the work allowed or the deadline there are none.
 
+The engine finds it as the structural concurrency relation of a net whose places are the literals
+(`analysis/engine/src/concurrency.rs`).
+
 Cost: a matrix of literals by literals in bytes; each move is looked at again when a pair of its needs has changed.
 """
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, Protocol
@@ -32,14 +34,16 @@ from typing import Final, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from firable.analysis._engine import BudgetExceeded, pairs_together
+from firable.analysis.compiled import Row, engine_limits
 from firable.analysis.deadline import Deadline
 from firable.analysis.reduction.draft import Draft, Literal, Move, literal
 
 MATRIX_BYTES_MAX: Final = 256 * 2**20
-WORK_MAX: Final = 20_000_000_000
-"""Bytes of the matrix that are read, at most: some seconds."""
-_LOOK: Final = 20_000  # what looking at a move costs besides, in the same unit
-_POLL: Final = 256
+WORDS_MAX: Final = 2**32
+"""Words of rows that are read, at most: some seconds."""
+_WORD: Final = 64  # literals in a word
+_FEW: Final = 16  # needs of a move whose pairs are looked at one by one
 
 Matrix = npt.NDArray[np.bool_]
 
@@ -89,6 +93,9 @@ class Pairs:
     def dead(self, move: Move) -> bool:
         """Whether the move can never be made."""
         rows = [self.numbers[need] for need in move.literals]
+        if len(rows) <= _FEW:
+            cells, size = self.cells, len(self.numbers)
+            return any(not cells[one * size + other] for at, one in enumerate(rows) for other in rows[: at + 1])
         return not bool(self.together[np.ix_(rows, rows)].all())
 
 
@@ -104,81 +111,34 @@ def pairs(
     bound = None
     if known is not None:
         rows = np.array([known.numbers[one] for one in numbers], dtype=np.intp)
-        bound = known.together[np.ix_(rows, rows)]
-    initial = np.zeros(size, dtype=np.bool_)
-    initial[[numbers[literal(place, draft.values[place])] for place in order]] = True
-    together = np.outer(initial, initial)
-    if not _propagate(draft, numbers, together, bound, deadline):
+        bound = _packed(known.together[np.ix_(rows, rows)])
+    try:
+        found = pairs_together(
+            size,
+            [_row(move, numbers) for move in draft.moves.values()],
+            [numbers[literal(place, draft.values[place])] for place in order],
+            bound,
+            max_words=WORDS_MAX,
+            **engine_limits(deadline),
+        )
+    except BudgetExceeded:
         return None
-    return Pairs(numbers, together)
+    return None if found is None else Pairs(numbers, _unpacked(found, size))
 
 
-def _propagate(
-    draft: Draft, numbers: dict[Literal, int], together: Matrix, bound: Matrix | None, deadline: Deadline
-) -> bool:
-    """Close `together` under the moves, within `bound`; False where that ended early."""
-    size, work, looked = len(numbers), 0, 0
-    changed = np.ones(size, dtype=np.int64)  # when the row of a literal changed last
-    moves = [_Rows(move, numbers) for move in _from_the_start(draft)]
-    now = 1
-    again = True
-    while again:
-        again = False
-        for move in moves:
-            looked += 1
-            work += _LOOK
-            if looked % _POLL == 0 and (work > WORK_MAX or deadline.over):
-                return False
-            if len(move.needs) and changed[move.needs].max() <= move.looked:
-                continue
-            if not len(move.needs) and move.looked:
-                continue
-            move.looked = now
-            work += size * (len(move.needs) + 2 * len(move.made))
-            possible: Matrix = np.logical_and.reduce(together[move.needs])
-            if not possible[move.needs].all():
-                continue
-            possible[move.own] = False
-            possible[move.after] = True
-            now += 1
-            for made in move.made:
-                new = possible & ~together[made]
-                if bound is not None:
-                    new &= bound[made]
-                if new.any():
-                    together[made] |= new
-                    together[:, made] |= new
-                    changed[new] = now
-                    changed[made] = now
-                    again = True
-    return True
+def _row(move: Move, numbers: Mapping[Literal, int]) -> Row:
+    """A move as the engine takes it, with literals in place of places."""
+    flipped = [numbers[one ^ 1] for one in move.made]
+    made = [numbers[one] for one in move.made]
+    return flipped, made, [numbers[literal(place, move.needs[place])] for place in move.reads], [], []
 
 
-def _from_the_start(draft: Draft) -> list[Move]:
-    """The moves in the order in which they may be made for the first time, so that a round carries a token far."""
-    true = {literal(place, draft.values[place]) for place in draft.places}
-    missing = {number: len(move.needs) for number, move in draft.moves.items()}
-    order = [draft.moves[number] for number, count in missing.items() if not count]
-    todo = deque(sorted(true))
-    while todo:
-        for number in sorted(draft.at[todo.popleft()]):
-            missing[number] -= 1
-            if not missing[number]:
-                order.append(draft.moves[number])
-                todo += [made for made in draft.moves[number].made if made not in true]
-                true.update(draft.moves[number].made)
-    return order
+def _packed(matrix: Matrix) -> bytes:
+    """Rows of bits in whole words."""
+    columns = np.zeros((len(matrix), -len(matrix) % _WORD), dtype=np.bool_)
+    return np.packbits(np.hstack([matrix, columns]), axis=1, bitorder="little").tobytes()
 
 
-class _Rows:
-    """A move in the numbers of the matrix, and when it was looked at last."""
-
-    __slots__ = ("after", "looked", "made", "needs", "own")
-
-    def __init__(self, move: Move, numbers: dict[Literal, int]) -> None:
-        self.needs = np.array([numbers[need] for need in move.literals], dtype=np.intp)
-        self.made = [numbers[one] for one in move.made]
-        self.own = np.concatenate([self.needs, self.needs ^ 1])
-        kept = [numbers[literal(place, move.needs[place])] for place in move.reads]
-        self.after = np.array([*self.made, *kept], dtype=np.intp)
-        self.looked = 0
+def _unpacked(rows: bytes, size: int) -> Matrix:
+    bits = np.frombuffer(rows, dtype=np.uint8).reshape(size, -1 if size else 0)
+    return np.unpackbits(bits, axis=1, count=size, bitorder="little").view(np.bool_)

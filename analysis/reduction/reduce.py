@@ -127,6 +127,24 @@ class ReducedRuns(_WithRuns):
 
 
 @dataclass(frozen=True)
+class ReducedBranches:
+    """A smaller net that satisfies the formulas of CTL without X over some labels that the `original` one satisfies.
+
+    `labels` give, for state formulas of the original net, what stands for them in the small one.
+    """
+
+    original: Net
+    net: Net
+    applied: Mapping[str, int]
+    labels: Mapping[Formula, Formula]
+
+    @property
+    def summary(self) -> str:
+        """What was reduced to what, by which rules: for the method of a verdict."""
+        return _summary(self.original, self.net, self.applied)
+
+
+@dataclass(frozen=True)
 class ReducedTransitions:
     """A smaller net in which the transitions fire as in the `original` one, whatever has fired before.
 
@@ -152,12 +170,13 @@ def _summary(original: Net, small: Net, applied: Mapping[str, int]) -> str:
     return f"reduction from {before} to {after} places/transitions by {rules or 'no rule'}"
 
 
-def reduce_for_goal(net: Net, goal: Formula, limits: Limits | None = None) -> Reduced:
+def reduce_for_goal(net: Net, goal: Formula, limits: Limits | None = None, facts: Pairs | None = None) -> Reduced:
     """Reduce a net, preserving whether a state formula is reachable under interleaving.
 
     A goal that is `deadlock`, alone or in conjunction, keeps what deadlocks there are; any other goal lets go of all
-    that does not lead to it. Cost: linear in the arcs but for the facts on pairs, which are bounded; stops at the
-    deadline with what it has by then.
+    that does not lead to it. Cost: linear in the arcs but for the facts on pairs, which are bounded, and less with
+    `facts_on` the net; stops at the deadline with what it has by then. Steps of a reduction with such facts are none
+    that a checker can take.
 
     >>> from firable.nets.formula import parse_formula
     >>> from firable.nets.catalogue import catalogue_net
@@ -170,7 +189,7 @@ def reduce_for_goal(net: Net, goal: Formula, limits: Limits | None = None) -> Re
     """
     limits = limits or Limits()
     draft = Draft(net, goal_of(net, goal), limits.deadline)
-    _reduce(draft, limits)
+    _reduce(draft, limits, facts)
     small, numbers = draft.as_net()
     assert isinstance(draft.goal, Goal)
     moves = {name: draft.moves[number] for name, number in numbers.items()}
@@ -238,6 +257,34 @@ def reduce_for_runs(
         tails=tuple(draft.tails),
         labels=dict(zip(labels, draft.goal.formulas, strict=True)),
     )
+
+
+def reduce_for_branches(
+    net: Net, labels: Sequence[Formula], limits: Limits | None = None, facts: Pairs | None = None
+) -> ReducedBranches:
+    """Reduce a net, keeping which formulas of CTL without X over some state formulas M0 satisfies.
+
+    Each marking of the one net has one of the other that satisfies the same of them (branching bisimilarity that is
+    sensitive to divergence; Browne, Clarke and Grumberg 1988, "Characterizing finite Kripke structures in
+    propositional temporal logic", for CTL without X). Rules and cost are those of `reduce_for_runs`, but that firings
+    are put together only where no choice is between them (`agglomeration`).
+
+    Raises `BudgetExceeded` where the deadline comes before the net is read.
+
+    >>> from firable.nets.formula import Holds
+    >>> from firable.nets.catalogue import catalogue_net
+    >>> net = catalogue_net("one_robot")
+    >>> reduced = reduce_for_branches(net, [Holds("mc.machining")])
+    >>> len(net.places), len(reduced.net.places)
+    (28, 1)
+    """
+    limits = limits or Limits()
+    given = tuple(rewritten(written_out(net, of), {}) for of in labels)
+    draft = Draft(net, Labels(given, branching=True), limits.deadline)
+    _reduce(draft, limits, facts)
+    assert isinstance(draft.goal, Labels)
+    small, _ = draft.as_net()
+    return ReducedBranches(net, small, draft.applied, dict(zip(labels, draft.goal.formulas, strict=True)))
 
 
 def reduce_for_liveness(net: Net, limits: Limits | None = None) -> ReducedTransitions:

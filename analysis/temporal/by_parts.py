@@ -6,8 +6,7 @@ three values. A part that comes down to a goal is asked as one; for `EX` and `AX
 `EF p` and `E[q U p]` fail where a state formula that p implies cannot be reached; and all else is evaluated where it is
 asked (`local`), first of all for a moment, since that often is enough.
 
-Rejected: to reduce the net for the formula, as for a goal. Of the rules of `analysis/reduction` few keep what a formula
-with nested operators says, and its state formulas name most places; the goals, each reduced for by itself, name few.
+Without X, a formula and each part of one is asked in the net reduced for it, too (`in_reduced`).
 """
 
 from __future__ import annotations
@@ -21,13 +20,15 @@ from typing import Final
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.question import Answer, Known
-from firable.analysis.reduction.deciding import decide_by_reduction
+from firable.analysis.reduction.deciding import ByReduction
+from firable.analysis.reduction.reducer import Reducer
+from firable.analysis.temporal.in_reduced import CtlInReduced
 from firable.analysis.temporal.local import METHOD, decide_ctl_on_the_fly
 from firable.analysis.temporal.queries import as_goal
 from firable.analysis.temporal.simplifying import FALSE, TRUE, implied, simplified
 from firable.analysis.walk import Walks
-from firable.nets.formula import And, Constant, Formula, Not, Or, Start
-from firable.nets.net import Net, holding
+from firable.nets.formula import Constant, Formula, Not, Start, leaves_in
+from firable.nets.net import Net
 from firable.nets.temporal import (
     Eventually,
     Exists,
@@ -40,13 +41,14 @@ from firable.nets.temporal import (
     TemporalOr,
     Until,
 )
-from firable.nets.temporal_parts import with_states
+from firable.nets.temporal_parts import states_in
 from firable.nets.verdict import Cost, Witness
 from firable.semantics.algebra import BOOL
 from firable.semantics.formulas import evaluate
 from firable.semantics.player import Player, holds_in
 
 _GLANCE: Final = 0.05  # of the time that is left, for a first local evaluation
+_REDUCED: Final = 0.6  # for the formula, and for each part of it, in a reduced net
 _CONSTANTS: Final = 0.5  # for state formulas that hold always or never
 _EACH: Final = 0.1  # for one of these
 _PART: Final = 0.4  # for each part by goals
@@ -74,7 +76,7 @@ class CtlByParts:
     """Formulas of CTL on one net, one after the other: what is found of goals for one of them is kept for all."""
 
     def __init__(self, net: Net) -> None:
-        self._goals = _Goals(net)
+        self._goals = _Goals(Reducer(net))
 
     def __call__(self, formula: Temporal, limits: Limits) -> Known:
         """As `decide_ctl_by_parts`."""
@@ -90,12 +92,26 @@ class CtlByParts:
 
 @dataclass
 class _Goals:
-    """A net with what was found of goals in it."""
+    """A net with what was found of goals in it, and who is asked about it and keeps what it finds."""
 
-    net: Net
+    reducer: Reducer
     findings: dict[Formula, Finding] = field(default_factory=dict)
     walked: set[Formula] = field(default_factory=set)
     """The goals that a walk does not meet."""
+
+    @property
+    def net(self) -> Net:
+        return self.reducer.net
+
+    @cached_property
+    def by_reduction(self) -> ByReduction:
+        """Goals in reduced nets."""
+        return ByReduction(self.net, self.reducer)
+
+    @cached_property
+    def in_reduced(self) -> CtlInReduced:
+        """Formulas without X in reduced nets."""
+        return CtlInReduced(self.reducer)
 
     @cached_property
     def walks(self) -> Walks:
@@ -106,8 +122,9 @@ class _Goals:
         """What is found of a goal; None where it is not decided."""
         if goal in self.findings:
             return self.findings[goal]
-        walk, reduction = partial(self.walks.decide, firings=_FIRINGS), partial(decide_by_reduction, self.net)
-        for decide in [reduction] if goal in self.walked else [walk, reduction]:
+        walk = partial(self.walks.decide, firings=_FIRINGS)
+        deciders: list[Callable[[Formula, Limits], Finding]] = [walk, self.by_reduction]
+        for decide in deciders[goal in self.walked :]:
             try:
                 finding = decide(goal, limits)
             except (BudgetExceeded, IncompleteGraph):
@@ -136,6 +153,8 @@ class _Parts:
         """The value of a formula in M0, and what shows it where one firing sequence does."""
         formula = simplified(formula)
         if (holds := self._locally(formula, _GLANCE)) is not None:
+            return holds, None
+        if as_goal(formula) is None and (holds := self._in_reduced(formula)) is not None:
             return holds, None
         until = self._part(_CONSTANTS)
         formula = simplified(formula, lambda state: self._constant(state, until))
@@ -171,6 +190,13 @@ class _Parts:
         self.methods.append(METHOD)
         return known.answer.holds
 
+    def _in_reduced(self, formula: Temporal) -> bool | None:
+        if (found := self.goals.in_reduced.decided(formula, self._part(_REDUCED))) is None:
+            return None
+        holds, method = found
+        self.methods.append(method)
+        return holds
+
     def _value(self, formula: Temporal) -> tuple[bool | None, Witness | None]:
         match formula:
             case _ if isinstance(formula, Formula):
@@ -186,7 +212,9 @@ class _Parts:
             finding = self._asked(goal[0], self._part(_PART))
             if finding is not None:
                 return finding.reachable is goal[1], finding.witness
-        if (holds := self._bounded(formula)) is None:
+        if (holds := self._in_reduced(formula)) is None:
+            holds = self._bounded(formula)
+        if holds is None:
             holds = self._locally(formula, _PART)
         if holds is None and isinstance(formula, Exists | ForAll) and isinstance(formula.path, Next):
             holds = self._after(formula.path.operand, every=isinstance(formula, ForAll))
@@ -230,38 +258,22 @@ class _Parts:
         """Whether every, or some, next marking satisfies a formula that does not speak of M0."""
         player = Player(self.net)
         firable = player.may_fire(self.net.initial_marking)
-        if len(firable) > _NEXT_MAX or _speaks_of_start(operand):
+        if len(firable) > _NEXT_MAX or self.limits.deadline.over or _speaks_of_start(operand):
             return None
-        values = []
+        values = list[bool | None]()
         for number, t in enumerate(firable):
             marking = player.fire(self.net.initial_marking, (t,))
-            net = replace(self.net, places=holding(self.net.places, marking))
-            there = _Parts(_Goals(net), self._part(1 / (len(firable) - number)), self.methods)
+            goals, until = _Goals(self.goals.reducer.at(marking)), self._part(1 / (len(firable) - number))
+            there = _Parts(goals, until, self.methods)
             holds, _ = there._value(operand)
             if holds is not every and holds is not None:
                 return holds
+            if self.limits.deadline.over:
+                return None
             values.append(holds)
         return None if None in values else every
 
 
 def _speaks_of_start(formula: Temporal) -> bool:
     """Whether some state formula in it names M0: a net with another first marking would take that for its own."""
-    found: list[bool] = []
-
-    def look(state: Formula) -> Formula:
-        found.append(_names_start(state))
-        return state
-
-    with_states(formula, look)
-    return any(found)
-
-
-def _names_start(state: Formula) -> bool:
-    match state:
-        case Start():
-            return True
-        case Not(operand):
-            return _names_start(operand)
-        case And(operands) | Or(operands):
-            return any(map(_names_start, operands))
-    return False
+    return any(isinstance(leaf, Start) for state in states_in(formula) for leaf in leaves_in(state))

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 from firable.analysis.temporal.sets import Sets
+from firable.analysis.temporal.simplifying import simplified
 from firable.nets.formula import Formula
 from firable.nets.temporal import (
     Eventually,
@@ -85,6 +86,16 @@ class Ctl(Generic[S]):
             case _ if isinstance(formula, Formula):
                 return sets.of(formula)
         raise ValueError(f"{formula} is no formula of CTL")
+
+
+def satisfied(ctl: Ctl[S], formula: Temporal) -> bool:
+    """Whether M0 satisfies a formula, which is made simpler before.
+
+    Raises `IncompleteGraph` where the space is not whole.
+    """
+    space = ctl.sets.space
+    space.require_complete()
+    return space.contains(ctl.of(simplified(formula, ctl.sets.constant)), space.net.initial_marking)
 
 
 def dual(formula: ForAll) -> Temporal:

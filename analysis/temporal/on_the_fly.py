@@ -20,7 +20,7 @@ sees 10^20 markings at once, where this sees one after the other.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -29,6 +29,7 @@ from firable.analysis._engine import BudgetExceeded, IncompleteGraph, Lasso, fin
 from firable.analysis.compiled import Flat, Node, engine_limits, flat, nodes_of
 from firable.analysis.goal import Limits
 from firable.analysis.question import Known, no, yes
+from firable.analysis.reduction.reducer import Reducer
 from firable.analysis.spaces.reachability import REASONS
 from firable.analysis.spaces.space import WitnessError
 from firable.analysis.temporal.automaton import Automaton, Edge, TimeEndedError, TooLargeError, automaton_of
@@ -43,7 +44,6 @@ from firable.nets.verdict import Cost
 from firable.semantics.trace import Discipline
 
 if TYPE_CHECKING:
-    from firable.analysis.reduction.pairs import Pairs
     from firable.analysis.reduction.reduce import ReducedRuns
 
 METHOD: Final = "on the fly"
@@ -53,11 +53,7 @@ _VERTICES_MAX: Final = 2**32 - 2
 _SPARED: Final = 4
 """So many times fewer, as each takes longer, where firings are left out."""
 _REDUCING_SHARE: Final = 0.7
-"""The part of the time left that the reduction may take."""
-_REDUCING_SECONDS: Final = 8e-5
-"""What it takes for each place and each transition, of large nets: with less time it is not begun."""
-_PROVING_SECONDS: Final = 1e-4
-"""The same of what is proved of the net for all its formulas."""
+"""The part of the time left that the reduction may take: where it takes longer it is not begun."""
 _BUDGETS: Final = (2**14, 2**18, 2**22)
 """Vertices of a search in the order of the net and of one in a drawn order, in turn; then one without a bound."""
 
@@ -104,7 +100,7 @@ class LtlOnTheFly:
     def __init__(self, net: Net) -> None:
         self.net = net
         self._searches: dict[Temporal, _Search] = {}
-        self._reducer = _Reducer(net)
+        self._reducer = Reducer(net)
 
     def __call__(self, formula: Temporal, limits: Limits, *, turns: Iterable[Turn] | None = None) -> Known:
         """As `decide_ltl_on_the_fly`."""
@@ -138,7 +134,7 @@ class _Search:
     The automaton `stutters` where it does not matter to it how long a run stays with the same values of the atoms.
     """
 
-    def __init__(self, net: Net, formula: Temporal, automaton: Automaton, reducer: _Reducer, *, stutters: bool) -> None:
+    def __init__(self, net: Net, formula: Temporal, automaton: Automaton, reducer: Reducer, *, stutters: bool) -> None:
         self.net, self.formula, self.automaton, self.stutters = net, formula, automaton, stutters
         self._reducer = reducer
         self.vertices = self.edges = 0
@@ -212,7 +208,7 @@ class _Search:
         atoms = sorted({atom for edge in edges for atom in edge.atoms}, key=repr)
         within, began = replace(limits, deadline=limits.deadline.share(_REDUCING_SHARE)), perf_counter()
         try:
-            reduced = self._reducer.reduced(atoms, within)
+            reduced = self._reducer.for_runs(atoms, within)
         except BudgetExceeded:
             return None
         rows = [
@@ -237,33 +233,6 @@ class _Search:
         end = "the cycle goes on for ever" if run.cycle else "the sequence ends in a deadlock"
         note = f"this run does not satisfy the formula: {end}"
         return Known(no(witness=witness_of(self.net, Discipline.INTERLEAVING, run, note)), method, self._cost)
-
-
-class _Reducer:
-    """Reduces a net for one formula after the other; what is proved of it is kept for the next."""
-
-    def __init__(self, net: Net) -> None:
-        self.net = net
-        self._facts: Pairs | None = None
-        self._are_facts_tried = False
-
-    @property
-    def takes_seconds(self) -> float:
-        """About how long the next reduction takes."""
-        each = 0.0 if self._are_facts_tried else _PROVING_SECONDS
-        return (each + _REDUCING_SECONDS) * (len(self.net.places) + len(self.net.transitions))
-
-    def reduced(self, atoms: Sequence[Formula], limits: Limits) -> ReducedRuns:
-        """The net reduced for runs through these atoms, as far as that comes until the deadline.
-
-        Raises `BudgetExceeded` where the deadline comes before the net is read.
-        """
-        from firable.analysis.reduction.reduce import facts_on, reduce_for_runs  # with numpy, where first needed
-
-        if not self._are_facts_tried:
-            self._facts = facts_on(self.net, limits)
-            self._are_facts_tried = self._facts is not None or not limits.deadline.over
-        return reduce_for_runs(self.net, atoms, limits, self._facts)
 
 
 def _run(prefix: Iterable[int], cycle: Iterable[int]) -> Run:

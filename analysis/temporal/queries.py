@@ -15,12 +15,11 @@ from firable.analysis._engine import BudgetExceeded
 from firable.analysis.question import Answer, Question, listed, no, unknown, yes
 from firable.analysis.spaces.space import StateSpace, WitnessError
 from firable.analysis.temporal.automaton import TimeEndedError, TooLargeError
-from firable.analysis.temporal.ctl import Ctl
+from firable.analysis.temporal.ctl import Ctl, satisfied
 from firable.analysis.temporal.evidence import refuted, shown
 from firable.analysis.temporal.lasso import TooLongError, accepted_run, satisfies, witness_of
 from firable.analysis.temporal.ltl import refuting
 from firable.analysis.temporal.sets import Sets
-from firable.analysis.temporal.simplifying import simplified
 from firable.nets.formula import Count, Formula, Not, format_count
 from firable.nets.net import TemporalProperty
 from firable.nets.queries import Query, QueryKind, format_query
@@ -139,10 +138,7 @@ def _goal(space: StateSpace[S], goal: Formula, *, holds: bool) -> Answer:
 
 def _ctl(space: StateSpace[S], formula: Temporal) -> Answer:
     ctl = Ctl(Sets(space))
-    space.require_complete()
-    simpler = simplified(formula, ctl.sets.constant)
-    holds = space.contains(ctl.of(simpler), space.net.initial_marking)
-
+    holds = satisfied(ctl, formula)
     return _decided(space, holds, lambda: shown(ctl, formula) if holds else refuted(ctl, formula))
 
 

@@ -22,6 +22,8 @@ pub mod budget;
 #[forbid(unsafe_code)]
 pub mod compact;
 #[forbid(unsafe_code)]
+mod concurrency;
+#[forbid(unsafe_code)]
 pub mod condensed;
 #[forbid(unsafe_code)]
 pub mod csr;
@@ -107,6 +109,8 @@ mod extension {
     use crate::python::lasso::{Lasso, find_lasso};
     #[pymodule_export]
     use crate::python::local::{Local, evaluate_locally};
+    #[pymodule_export]
+    use crate::python::pairs::pairs_together;
     #[pymodule_export]
     use crate::python::rows::flat;
     #[pymodule_export]

@@ -225,7 +225,7 @@ def test_what_was_known_bounds_what_is_proved_later() -> None:
 def test_facts_that_take_too_long_are_none(monkeypatch: pytest.MonkeyPatch) -> None:
     draft = draft_of("a", "a", *(f"t{i}: a -> b{i}" for i in range(300)))
     assert pairs(draft, None, NEVER) is not None
-    monkeypatch.setattr("firable.analysis.reduction.pairs.WORK_MAX", 1)
+    monkeypatch.setattr("firable.analysis.reduction.pairs.WORDS_MAX", 1)
     assert pairs(draft, None, NEVER) is None
     monkeypatch.undo()
     assert pairs(draft, None, NEVER, matrix_bytes_max=1) is None

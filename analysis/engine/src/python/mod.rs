@@ -12,6 +12,7 @@ pub(crate) mod explore;
 pub(crate) mod graph;
 pub(crate) mod lasso;
 pub(crate) mod local;
+pub(crate) mod pairs;
 pub(crate) mod rows;
 pub(crate) mod stubborn;
 

@@ -2,7 +2,7 @@
 //!
 //! Ten thousand machines have more markings than there are atoms, and yet a diagram of a few nodes for each place. Here
 //! is the method for such nets: zero-suppressed decision diagrams (`zdd`, `algebra`, `cache`), one place a level in an
-//! order that keeps neighbours together (`order`, `spectral`, `race`) or units whole (`units`, `concurrency`), transitions
+//! order that keeps neighbours together (`order`, `spectral`, `race`) or units whole (`units`), transitions
 //! as lists of literals (`events`), reachability by saturation (`saturation`, `firing`), which takes several places at
 //! once (`blocks`, `values`, `parts`), on a net whose places were merged (`merging`, `trial`) and are told apart in what
 //! is found (`standing`, `exploring`), one step of all transitions (`image`), runs that go on for ever (`endless`), exact
@@ -18,7 +18,6 @@ pub mod algebra;
 mod blocks;
 mod blockwise;
 pub mod cache;
-mod concurrency;
 pub mod count;
 mod endless;
 pub mod events;

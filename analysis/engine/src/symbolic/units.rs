@@ -6,8 +6,8 @@
 //! in between, as they are many more; and what is between a few dozen units can be laid out far better than hundreds
 //! of places can. Of the nets of the model-checking contest that take seconds most are found several times sooner so.
 //!
-//! The units are made of the net itself, by which places are concurrent (`concurrency`): of two that are joined by arcs
-//! those come together first that are joined by most, as long as no two of their places may be marked together. Their
+//! The units are made of the net itself, by which places are concurrent (`crate::concurrency`): of two that are joined by
+//! arcs those come together first that are joined by most, as long as no two of their places may be marked together. Their
 //! order is the best of some, of which each is made by FORCE and then by *sifting*: unit by unit goes to wherever the
 //! spans are least. (Rudell's sifting moves levels of the diagram itself; here nothing is moved but in the sum.) From one
 //! start alone both end in an order that no single move betters, which may be a bad one.
@@ -19,9 +19,9 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
-use super::concurrency::Concurrency;
 use super::order::{FORCE_ROUNDS, Graph, Order, both, joined};
 use crate::budget::{Stop, Watch};
+use crate::concurrency::Concurrency;
 use crate::net::Transition;
 use crate::random::Random;
 

@@ -6,6 +6,11 @@
 //! reachable marking has; it is found in whole rows of bits, where the exact one would take the state space itself. That
 //! firings wait for contact is left out: it only keeps them away.
 //!
+//! It does for literals as well, a place with a value: of a firing that needs some and makes others the inputs are those
+//! that it makes false, and the gates those that it leaves. Which pairs of them are true together is more than which places
+//! are marked together, as it knows contact and both kinds of gates (Haslum and Geffner 2000, "Admissible heuristics for
+//! optimal planning": h²). What is known already of a part of the relation bounds what may be found.
+//!
 //! Source: the structural concurrency relation (Kovalyov 1992, "Concurrency relations and the safety problem for Petri
 //! nets"), with gates, and by a worklist.
 
@@ -22,27 +27,18 @@ const WORDS_MAX: usize = 1 << 28;
 
 /// A symmetric relation of places, a row of bits each.
 #[derive(Debug)]
-pub(super) struct Concurrency {
+pub(crate) struct Concurrency {
     words: usize,
     rows: Vec<u64>,
     /// The places that may be marked at all.
     marked: Vec<u64>,
+    /// The rows that all is known to be in, each with its own place if that may be marked.
+    bound: Option<Vec<u64>>,
 }
 
 impl Concurrency {
     /// The relation of a net, or None where it would take too long.
-    pub(super) fn of(
-        places: usize,
-        transitions: &[Transition],
-        initial: &[u32],
-        watch: &mut Watch<'_>,
-    ) -> Result<Option<Self>, Stop> {
-        Self::within(WORDS_MAX, places, transitions, initial, watch)
-    }
-
-    /// The same, looking at so many words at most.
-    fn within(
-        words_max: usize,
+    pub(crate) fn of(
         places: usize,
         transitions: &[Transition],
         initial: &[u32],
@@ -51,8 +47,21 @@ impl Concurrency {
         if places > PLACES_MAX {
             return Ok(None);
         }
+        Self::within(WORDS_MAX, places, transitions, initial, None, watch)
+    }
+
+    /// The same of any net, looking at so many words at most, where `bound` has, for each place, the row of those that
+    /// may be marked with it, itself among them.
+    pub(crate) fn within(
+        words_max: usize,
+        places: usize,
+        transitions: &[Transition],
+        initial: &[u32],
+        bound: Option<Vec<u64>>,
+        watch: &mut Watch<'_>,
+    ) -> Result<Option<Self>, Stop> {
         let mut agenda = Agenda::new(places, transitions);
-        let mut relation = Concurrency::at_first(places, initial);
+        let mut relation = Concurrency { bound, ..Concurrency::at_first(places, initial) };
         let (mut behind, mut looked) = (vec![0; relation.words], 0);
         while let Some(t) = agenda.pop() {
             let transition = &transitions[t as usize];
@@ -88,19 +97,34 @@ impl Concurrency {
             row.copy_from_slice(&marked);
             clear(row, place);
         }
-        Concurrency { words, rows, marked }
+        Concurrency { words, rows, marked, bound: None }
     }
 
     /// Whether two places may be marked together; a place is not concurrent to itself.
-    pub(super) fn has(&self, one: u32, other: u32) -> bool {
+    pub(crate) fn has(&self, one: u32, other: u32) -> bool {
         holds(self.row(one), other)
     }
 
     /// Gives a place the row of another one besides its own.
-    pub(super) fn join(&mut self, place: u32, other: u32) {
+    pub(crate) fn join(&mut self, place: u32, other: u32) {
         for at in 0..self.words {
             self.rows[place as usize * self.words + at] |= self.rows[other as usize * self.words + at];
         }
+    }
+
+    /// The rows end to end, with each place that may be marked in its own.
+    pub(crate) fn into_rows(mut self) -> Vec<u64> {
+        for place in 0..(self.rows.len() / self.words) as u32 {
+            if holds(&self.marked, place) {
+                self.relate(place, place);
+            }
+        }
+        self.rows
+    }
+
+    /// Those of a word of other places that may be found beside a place.
+    fn allowed(&self, place: u32, at: usize) -> u64 {
+        self.bound.as_ref().map_or(!0, |rows| rows[place as usize * self.words + at])
     }
 
     fn row(&self, place: u32) -> &[u64] {
@@ -135,13 +159,16 @@ impl Concurrency {
     /// Takes a place as marked beside these others; how many of them it was not known to be beside.
     fn mark(&mut self, place: u32, others: &[u64], agenda: &mut Agenda) -> usize {
         let mut found = 0;
+        if self.allowed(place, place as usize / 64) >> (place % 64) & 1 == 0 {
+            return 0;
+        }
         if !holds(&self.marked, place) {
             put(&mut self.marked, place);
             agenda.touch(place);
             agenda.touch_nothing();
         }
         for (at, others) in others.iter().enumerate() {
-            let mut new = others & !self.row(place)[at];
+            let mut new = others & !self.row(place)[at] & self.allowed(place, at);
             while new != 0 {
                 let other = 64 * at as u32 + new.trailing_zeros();
                 new &= new - 1;
@@ -308,6 +335,26 @@ mod tests {
     }
 
     #[test]
+    fn what_is_bounded_is_found_within_and_what_follows_from_it() {
+        // A token goes from 0 over 1 to 2, beside one on 3, of which it is known that it is not there with 1.
+        let steps = [Transition::new(&[0], &[1], &[], &[], &[]), Transition::new(&[1], &[2], &[], &[], &[])];
+        let all = vec![0b1111; 4];
+        for (bound, wanted) in [
+            (None, vec![(0, 3), (1, 3), (2, 3)]),
+            (Some(all), vec![(0, 3), (1, 3), (2, 3)]),
+            (Some(vec![0b1111, 0b0111, 0b1111, 0b1101]), vec![(0, 3)]),
+            (Some(vec![0b1111, 0b0000, 0b1111, 0b1111]), vec![(0, 3)]),
+        ] {
+            let mut poll = unwatched;
+            let watch = &mut Watch::new(None, &mut poll);
+            let found = Concurrency::within(usize::MAX, 4, &steps, &[0, 3], bound, watch);
+            let found = found.expect("no budget").expect("no limit");
+            assert_eq!(pairs(&found), wanted);
+            assert!(found.into_rows()[3] >> 3 & 1 == 1);
+        }
+    }
+
+    #[test]
     fn a_relation_that_is_too_large_is_left_alone_and_the_watch_ends_it() {
         let mut poll = |_| Err(Stop::Cancelled);
         let net = machines(100, 0);
@@ -319,7 +366,7 @@ mod tests {
         let watch = &mut Watch::new(None, &mut poll);
         // Each of 200 transitions is looked at: one pair, and rows of 4 words for what it needs, puts, and leaves.
         for (words, is_found) in [(WORDS_MAX, true), (200 * (1 + 3 * 4) - 1, false)] {
-            let found = Concurrency::within(words, 200, &net.transitions, &initial, watch);
+            let found = Concurrency::within(words, 200, &net.transitions, &initial, None, watch);
             assert!(found.is_ok_and(|found| found.is_some() == is_found), "{words}");
         }
     }

@@ -1,0 +1,104 @@
+"""One net, reduced for one question after the other.
+
+What is proved of the pairs of its places, which takes half of a reduction, is true whatever is asked; so it is proved
+once. A reduction that came to its end is kept, since who is asked in turns is asked again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final, Generic, TypeVar
+
+from firable.analysis.goal import Limits
+from firable.nets.formula import Formula
+from firable.nets.net import Marking, Net, holding
+
+if TYPE_CHECKING:
+    from firable.analysis.reduction.pairs import Pairs
+    from firable.analysis.reduction.reduce import Reduced, ReducedBranches, ReducedRuns
+
+R = TypeVar("R")
+_KEPT_MAX: Final = 64
+_REDUCING_SECONDS: Final = 8e-5
+"""What it takes for each place and each transition, of large nets."""
+_PROVING_SECONDS: Final = 4e-5
+"""The same of what is proved of the net for all that is asked."""
+
+
+class Reducer:
+    """Reduces a net as `firable.analysis.reduction.reduce` does, by facts that are proved of it once."""
+
+    def __init__(self, net: Net, facts: Pairs | None = None) -> None:
+        self.net = net
+        self._facts = facts
+        self._are_facts_tried = facts is not None
+        self._is_first_goal = True
+        self._goals: _Kept[Reduced] = _Kept()
+        self._runs: _Kept[ReducedRuns] = _Kept()
+        self._branches: _Kept[ReducedBranches] = _Kept()
+
+    def at(self, marking: Marking) -> Reducer:
+        """The reducer of the net that begins in a reachable marking, of which all that is proved is true as well."""
+        return Reducer(replace(self.net, places=holding(self.net.places, marking)), self._facts)
+
+    @property
+    def takes_seconds(self) -> float:
+        """About how long the next reduction takes."""
+        each = 0.0 if self._are_facts_tried else _PROVING_SECONDS
+        return (each + _REDUCING_SECONDS) * (len(self.net.places) + len(self.net.transitions))
+
+    def for_goal(self, goal: Formula, limits: Limits) -> Reduced:
+        """The net reduced for a goal, as far as that comes until the deadline; a checker cannot take its steps.
+
+        The first goal is reduced for without facts on the whole net: what it does not depend on goes before any are
+        needed. Raises `BudgetExceeded` where the deadline comes before the net is read, as the others do.
+        """
+        from firable.analysis.reduction.reduce import reduce_for_goal  # with numpy, where first needed
+
+        def reduced() -> Reduced:
+            facts = self._facts if self._is_first_goal else self._proved(limits)
+            self._is_first_goal = False
+            return reduce_for_goal(self.net, goal, limits, facts)
+
+        return self._goals.of((goal,), reduced, limits)
+
+    def for_runs(self, labels: Sequence[Formula], limits: Limits) -> ReducedRuns:
+        """The net reduced for runs through these labels, as far as that comes until the deadline."""
+        from firable.analysis.reduction.reduce import reduce_for_runs
+
+        return self._runs.of(
+            tuple(labels), lambda: reduce_for_runs(self.net, labels, limits, self._proved(limits)), limits
+        )
+
+    def for_branches(self, labels: Sequence[Formula], limits: Limits) -> ReducedBranches:
+        """The net reduced for CTL without X over these labels, as far as that comes until the deadline."""
+        from firable.analysis.reduction.reduce import reduce_for_branches
+
+        return self._branches.of(
+            tuple(labels), lambda: reduce_for_branches(self.net, labels, limits, self._proved(limits)), limits
+        )
+
+    def _proved(self, limits: Limits) -> Pairs | None:
+        from firable.analysis.reduction.reduce import facts_on
+
+        if not self._are_facts_tried:
+            self._facts = facts_on(self.net, limits)
+            self._are_facts_tried = self._facts is not None or not limits.deadline.over
+        return self._facts
+
+
+class _Kept(Generic[R]):
+    """The reductions of one kind that were asked for last."""
+
+    def __init__(self) -> None:
+        self._found: dict[tuple[Formula, ...], R] = {}
+
+    def of(self, labels: tuple[Formula, ...], reduced: Callable[[], R], limits: Limits) -> R:
+        """What is kept, or else is made now, and is kept unless the deadline has ended it."""
+        found = self._found.pop(labels) if labels in self._found else reduced()
+        if not limits.deadline.over:
+            self._found[labels] = found
+            if len(self._found) > _KEPT_MAX:
+                del self._found[next(iter(self._found))]
+        return found

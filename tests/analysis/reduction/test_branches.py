@@ -1,0 +1,137 @@
+"""The net reduced for CTL without X satisfies what the original satisfies, and the techniques that ask it say so."""
+
+from __future__ import annotations
+
+import random
+from collections import Counter
+from collections.abc import Sequence
+
+from hypothesis import given
+from hypothesis import strategies as st
+from support.block_nets import block_net
+from support.cell_nets import cell_nets
+from support.dense_nets import dense_nets
+from support.examples import examples, seeds
+from support.lively_nets import lively_net, lively_nets
+from support.ring_nets import ring_nets
+from support.stuttering import stutter_blocks
+from support.temporal_formulas import ctl_formulas
+
+from firable.analysis.goal import Limits
+from firable.analysis.reduction.reduce import ReducedBranches, facts_on, reduce_for_branches, reduce_for_runs
+from firable.analysis.reduction.reducer import Reducer
+from firable.analysis.spaces.reachability import explore
+from firable.analysis.temporal.by_parts import decide_ctl_by_parts
+from firable.analysis.temporal.ctl import Ctl, satisfied
+from firable.analysis.temporal.in_reduced import CtlInReduced
+from firable.analysis.temporal.sets import Sets
+from firable.nets.formula import And, Firable, Formula, Holds, Not
+from firable.nets.net import Net, Place, Transition
+from firable.nets.temporal import format_temporal
+from firable.nets.temporal_parts import has_next
+
+NETS = st.one_of(cell_nets(), lively_nets(), ring_nets(signals=True), dense_nets(signals=True))
+
+
+def graph_of(net: Net, labels: Sequence[Formula]) -> tuple[list[list[int]], list[tuple[bool, ...]]]:
+    """The successors of each reachable marking, of which the first is M0, and which labels hold there."""
+    graph = explore(net)
+    columns = [graph.satisfying(label) for label in labels]
+    successors = [[target for _, target in graph.successors(v)] for v in range(graph.n_markings)]
+    return successors, [tuple(bool(column[v]) for column in columns) for v in range(graph.n_markings)]
+
+
+def same_branches(net: Net, labels: Sequence[Formula], facts: bool = False) -> ReducedBranches:
+    """The reduced net, if its M0 satisfies the same formulas of CTL without X over these labels."""
+    limits = Limits()
+    reduced = reduce_for_branches(net, labels, limits, facts_on(net, limits) if facts else None)
+    successors, values = graph_of(net, labels)
+    small, smaller = graph_of(reduced.net, [reduced.labels[label] for label in labels])
+    first = len(successors)
+    blocks = stutter_blocks(
+        [*successors, *([target + first for target in targets] for targets in small)], [*values, *smaller]
+    )
+    assert blocks[0] == blocks[first], (net, labels, reduced.summary)
+    # Each marking has one of the reduced net that says the same.
+    assert set(blocks[:first]) == set(blocks[first:]), (net, labels, reduced.summary)
+    return reduced
+
+
+@st.composite
+def labelled(draw: st.DrawFn, nets: st.SearchStrategy[Net] = NETS) -> tuple[Net, list[Formula]]:
+    net = draw(nets)
+    places = st.sampled_from([Holds(place.name) for place in net.places])
+    some = [places, places.map(Not), st.builds(lambda one, other: And((one, Not(other))), places, places)]
+    if net.transitions:
+        some.append(st.sampled_from([Firable(transition.name) for transition in net.transitions]))
+    return net, draw(st.lists(st.one_of(some), min_size=1, max_size=2, unique=True))
+
+
+@examples(60)
+@given(labelled(), st.booleans())
+def test_what_can_still_happen_is_kept(question: tuple[Net, list[Formula]], facts: bool) -> None:
+    same_branches(*question, facts=facts)
+
+
+def test_what_can_still_happen_is_kept_where_much_is_put_together() -> None:
+    applied, seen = Counter[str](), 0
+    for seed in seeds(150):
+        draw = random.Random(seed)
+        net = block_net(draw) if seed % 2 else lively_net(draw, 9)
+        places = [Holds(place.name) for place in net.places]
+        reduced = same_branches(net, draw.sample(places, min(len(places), draw.choice((1, 2)))), facts=seed % 3 == 0)
+        applied.update(reduced.applied.keys())
+        seen += 1
+    for rule in ("closers early", "openers late", "early firing", "implied place", "subsumed transition"):
+        assert 10 * applied[rule] > seen, applied
+
+
+def chain(*steps: tuple[tuple[str, ...], tuple[str, ...]], marked: Sequence[str] = ("a",)) -> Net:
+    names = dict.fromkeys(name for step in steps for side in step for name in side)
+    places = tuple(Place(name, marked=name in marked) for name in names)
+    return Net("net", places, tuple(Transition(f"t{n}", *step) for n, step in enumerate(steps)))
+
+
+def test_a_choice_of_closers_is_not_made_by_the_opener() -> None:
+    # From p the token goes over x or over y. At p both ends are possible still, which runs do not show.
+    net = chain((("a",), ("p",)), (("p",), ("x",)), (("p",), ("y",)), (("x",), ("left",)), (("y",), ("right",)))
+    labels = [Holds("a"), Holds("left"), Holds("right")]
+    assert "p" in {place.name for place in same_branches(net, labels).net.places}
+    assert "p" not in {place.name for place in reduce_for_runs(net, labels).net.places}
+
+
+def test_an_opener_that_is_in_a_choice_is_not_put_off() -> None:
+    # From a the token goes to b, or over p to c: at p it cannot go to b any more.
+    ways = (("z",), ("a",)), (("a",), ("p",)), (("p",), ("c",))
+    labels = [Holds("z"), Holds("c")]
+    chosen = same_branches(chain(*ways, (("a",), ("b",)), marked=("z",)), [*labels, Holds("b")])
+    assert {"a", "p"} <= {place.name for place in chosen.net.places}
+    # With nothing to choose one of the two is enough.
+    alone = same_branches(chain(*ways, marked=("z",)), labels)
+    assert len({"a", "p"} & {place.name for place in alone.net.places}) == 1
+
+
+def test_an_opener_that_a_gate_may_keep_away_is_not_put_off() -> None:
+    # While b is marked the token may go from a to p; it goes on to c whether b is marked or not.
+    places = tuple(Place(name, marked=name in ("a", "b")) for name in ("a", "p", "c", "b", "d"))
+    gated = Transition("h", ("a",), ("p",), permissive=("b",))
+    others = Transition("f", ("p",), ("c",)), Transition("m", ("b",), ("d",))
+    net = Net("gated", places, (gated, *others))
+    labels = [Holds("c"), Holds("d")]
+    assert "p" in {place.name for place in same_branches(net, labels).net.places}
+
+
+@examples(60)
+@given(st.data(), NETS)
+def test_formulas_without_x_have_the_value_that_they_have_over_sets(data: st.DataObject, net: Net) -> None:
+    names = [place.name for place in net.places], [transition.name for transition in net.transitions]
+    formula = data.draw(ctl_formulas(*names, leaves=6))
+    found = CtlInReduced(Reducer(net)).decided(formula, Limits())
+    expected = satisfied(Ctl(Sets(explore(net))), formula)
+    if found is None:
+        text = format_temporal(formula)
+        assert has_next(formula) or "deadlock" in text or "start" in text, text
+    else:
+        assert found[0] is expected, format_temporal(formula)
+        assert ", after reduction from" in found[1]
+    assert decide_ctl_by_parts(net, formula, Limits()).answer.holds is expected
