@@ -36,8 +36,10 @@ s after u; what can be made in s can be made in u(s), and leads to a pair of the
 again, as p is at rest or away between (branching bisimilarity that is sensitive to divergence: De Nicola and Vaandrager
 1995; steps of this kind are the confluent ones of Groote and Sellink 1996). The conditions come to this:
 
-- *closers early*, and there is one closer: of two, which one is made is a choice that openers do not make.
-- *openers late*, and there is one opener, of which no other move flips what it needs: else it is in a choice itself.
+- *closers early*, and there is one closer: which one of two is made is a choice that the opener does not make.
+- *openers late*, as for a deadlock, and there is one opener, as two keep each other away. What h flips nobody else
+  needs. Who flips what h only reads cannot be made while p is away; wherever h can be made he cannot either, since he
+  could be made after it as well.
 
 Sources: Berthelot 1986, "Checking properties of nets using transformations"; Haddad and Pradat-Peyre 2006, "New
 efficient Petri nets reductions for parallel programs verification"; Thierry-Mieg 2020, "Structural reductions
@@ -177,7 +179,7 @@ class _Around:
 
     def openers_late(self) -> bool:
         """Whether each opener can be made as late as just before a closer."""
-        if self.branching and not self._single_and_certain():
+        if self.branching and len(self.openers) > 1:
             return False
         for lost in self.flipped(self.openers.values()):
             if self.wanted(lost ^ 1) or any(True for _ in self.others(lost ^ 1)):
@@ -187,15 +189,6 @@ class _Around:
                 if any(place in other.flips for other in self.others(literal(place, move.needs[place]))):
                     return False
         return not self.draft.deadlock or self._without_competition()
-
-    def _single_and_certain(self) -> bool:
-        """Whether there is one opener, and no other move flips what it needs while the place is at rest."""
-        number, *more = self.openers
-        return not more and not any(
-            one // 2 in self.draft.moves[other].flips
-            for one in self.openers[number].literals
-            for other in self.draft.at[one] - self.closers.keys() - {number}
-        )
 
     def _without_competition(self) -> bool:
         """What late openers must fulfil for deadlocks besides."""

@@ -111,14 +111,24 @@ def test_an_opener_that_is_in_a_choice_is_not_put_off() -> None:
     assert len({"a", "p"} & {place.name for place in alone.net.places}) == 1
 
 
-def test_an_opener_that_a_gate_may_keep_away_is_not_put_off() -> None:
-    # While b is marked the token may go from a to p; it goes on to c whether b is marked or not.
-    places = tuple(Place(name, marked=name in ("a", "b")) for name in ("a", "p", "c", "b", "d"))
-    gated = Transition("h", ("a",), ("p",), permissive=("b",))
-    others = Transition("f", ("p",), ("c",)), Transition("m", ("b",), ("d",))
-    net = Net("gated", places, (gated, *others))
-    labels = [Holds("c"), Holds("d")]
+def net_of(marked: str, *transitions: Transition) -> Net:
+    names = dict.fromkeys(name for of in transitions for name in (*of.inputs, *of.outputs))
+    return Net("net", tuple(Place(name, marked=name in marked.split()) for name in names), transitions)
+
+
+def test_of_two_openers_that_keep_each_other_away_none_is_put_off() -> None:
+    # A token goes over p to w, from a or from b; then x brings another one to where it came from, or y does.
+    net = net_of(
+        "a b x y",
+        Transition("from_a", ("a",), ("p",), inhibitive=("w",)),
+        Transition("from_b", ("b",), ("p",), inhibitive=("w",)),
+        Transition("f", ("p",), ("w",)),
+        Transition("to_a", ("w", "x"), ("a",)),
+        Transition("to_b", ("w", "y"), ("b",)),
+    )
+    labels = [Holds("w"), Holds("x"), Holds("y")]
     assert "p" in {place.name for place in same_branches(net, labels).net.places}
+    assert "p" not in {place.name for place in reduce_for_runs(net, labels).net.places}
 
 
 @examples(60)
