@@ -89,7 +89,9 @@ _COUNTING_SECONDS_MAX: Final = 120.0
 _LEARNT_FIRST: Final = frozenset(question.name for question in QUESTIONS)
 _DEADLOCK_LANES: Final = ((Method.REDUCTION, Method.WALK, Method.STATE_EQUATION), (Method.PARIKH,))
 _FIRST_LANES: Final = ((Method.REDUCTION, Method.WALK), (Method.STATE_EQUATION, Method.PARIKH), *FORMULA_LANES)
+_QUERIES_LANES: Final = ((Method.REDUCTION,), *FORMULA_LANES)
 _FIRST_SLICES_SECONDS: Final = (3.0, 10.0)
+_QUERIES_SHARE: Final = 0.8  # of the time that is left, for hard ones where nothing else is asked
 _STATED_SHARE: Final = 0.5  # of the time, for what is stated and easy
 _FORMULAS_SHARES: Final = {Logic.LTL: 0.5, Logic.CTL: 0.25}
 """The parts of the time left for formulas before sets of markings, which decide more of CTL than of LTL."""
@@ -239,10 +241,12 @@ class _Check:
         settling.ask_in_turns(asked, (), _FIRST_LANES, share, _FIRST_SLICES_SECONDS, once=True)
         for of, part in FIRST_KNOWERS.items() if self.of_the_net else ():
             settling.learn(of, _LEARNT_FIRST, _moment(deadline, part))
-        # What else is hard waits for the processors, which the search for all markings has.
-        settling.ask_in_turns(
-            map(_asked_of, self._formulas(*Logic)), (), FORMULA_LANES, deadline, _FIRST_SLICES_SECONDS
-        )
+        # What else is hard of the net waits for the processors, which the search for all markings has; queries go on.
+        if self.of_the_net:
+            settling.ask_in_turns(map(_asked_of, self._formulas(*Logic)), (), FORMULA_LANES, deadline, None)
+        else:
+            until = replace(self.deadline.share(_QUERIES_SHARE), cancelled=enough)
+            settling.ask_in_turns(asked, (), _QUERIES_LANES, until, None)
         if self.of_the_net:
             settling.ask(_asked_of(DEADLOCK_FREE), (), _DEADLOCK_LANES, deadline, _FIRST_SLICES_SECONDS)
         is_all = not self.of_the_net and len(self._temporal) == len(self.net.properties)

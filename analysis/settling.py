@@ -96,6 +96,8 @@ class Settling:
     _asked: dict[tuple[str, frozenset[str]], tuple[Question, tuple[Goal, ...]] | None] = field(default_factory=dict)
     _walked: set[Formula] = field(default_factory=set)
     """The goals that a short walk does not meet."""
+    _tried: dict[str, float] = field(default_factory=dict)
+    """The longest turn, in seconds, that a verdict had in vain."""
     _judges: dict[tuple[Logic, Method], Callable[[Temporal, Limits], Known]] = field(default_factory=dict)
 
     def learn(self, of: Method, among: Collection[str], deadline: Deadline) -> None:
@@ -207,18 +209,22 @@ class Settling:
     ) -> None:
         """Settle verdicts, the easy ones first: all are asked in turns that grow, of which the last share out the time.
 
-        Which one is hard cannot be seen beforehand, and one that is would take its time from all others. With `once`
-        each has one turn.
+        Which one is hard cannot be seen beforehand, and one that is would take its time from all others. Where all have
+        had turns before, in vain, the first one is longer than the shortest of these. With `once` each has one turn.
         """
         waiting, left = list(verdicts), deadline.left_seconds
         seconds = _TURN_SECONDS if left is None else min(_TURN_SECONDS, _FIRST_TURN * left / max(1, len(waiting)))
+        seconds = max(seconds, _TURN_GROWTH * min((self._tried.get(of.name, 0.0) for of in waiting), default=0.0))
         while waiting:
             left = deadline.left_seconds
             longest = _TURN_SECONDS_MAX if left is None else left / len(waiting)
             is_last = not once and (len(waiting) == 1 or seconds >= longest)
             for later, verdict in zip(range(len(waiting), 0, -1), waiting, strict=True):
                 until = deadline.share(1 / later) if is_last else deadline.within(seconds)
+                turn = until.left_seconds
                 self.ask(verdict, fired, lanes, until, slices_seconds)
+                if turn is not None and verdict.name not in self.found:
+                    self._tried[verdict.name] = max(turn, self._tried.get(verdict.name, 0.0))
                 self.conclude()
             waiting = [] if is_last or once else [verdict for verdict in waiting if verdict.name not in self.found]
             seconds *= _TURN_GROWTH

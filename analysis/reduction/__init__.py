@@ -28,7 +28,8 @@ terms, in the essay of its file:
 
 What a rule does it notes as a step, which a checker with conditions of its own takes again
 (`firable.analysis.evidence.checking.reductions`). `reduce` applies the rules until none applies, `goals` is what they
-preserve, `components` takes apart what is left, and `deciding` puts all of it before any technique.
+preserve, `components` takes apart what is left, `deciding` puts all of it before any technique, and `reducer` keeps
+what is proved of a net for the next question.
 
 All of it is for interleaving: synchronous steps count how long things take, which no reduction leaves alone.
 Rejected: reductions that change what is asked but keep a bound on the answer, since no verdict here is approximate;

@@ -40,7 +40,9 @@ _WALKED_BESIDE: Final = 2**28
 """Firings of walks, alone and beside the others, which may have given up before."""
 _EXPLORED_MAX: Final = 2**22
 """Markings that are explored before walks begin, in so much of the time:"""
-_EXPLORING_SHARE: Final = 0.3
+_EXPLORING_SHARE: Final = 0.5
+_ALONE_SHARE: Final = 0.15
+"""The part of the time left for each technique that is alone before the others begin."""
 _ALONE_FIRST: Final = 2**12
 """Markings that stubborn sets search before a diagram is made beside."""
 
@@ -129,9 +131,9 @@ def _by_all(net: Net, goal: Formula, limits: Limits) -> Finding:
 
     Between the two a short walk: what is left of a net is small, and often falls into a deadlock by itself.
     """
-    first = decide_by_stubborn_sets(net, goal, limits, turns=((False, _ALONE_FIRST),))
+    first = decide_by_stubborn_sets(net, goal, _alone(limits), turns=((False, _ALONE_FIRST),))
     if first.reachable is None and not limits.deadline.over:
-        first = decide_by_walk(net, goal, limits, firings=_WALKED_FIRST)
+        first = decide_by_walk(net, goal, _alone(limits), firings=_WALKED_FIRST)
     if first.reachable is not None or limits.deadline.over:
         return first
     deciders: list[dict[str, Callable[[Net, Formula, Limits], Finding]]] = [
@@ -144,6 +146,10 @@ def _by_all(net: Net, goal: Formula, limits: Limits) -> Finding:
     outcome = race(lanes, of_two, slices_seconds=None)
     why = "the time was over" if limits.deadline.over else "; ".join(outcome.told)
     return outcome.answer or replace(first, bound=why)
+
+
+def _alone(limits: Limits) -> Limits:
+    return replace(limits, deadline=limits.deadline.share(_ALONE_SHARE))
 
 
 def _decided(decide: Callable[[Net, Formula, Limits], Finding], net: Net, goal: Formula, limits: Limits) -> Finding:

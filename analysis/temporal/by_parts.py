@@ -52,6 +52,8 @@ _REDUCED: Final = 0.6  # for the formula, and for each part of it, in a reduced 
 _CONSTANTS: Final = 0.5  # for state formulas that hold always or never
 _EACH: Final = 0.1  # for one of these
 _PART: Final = 0.4  # for each part by goals
+_NEXT: Final = 0.2  # for a formula of next markings, before these are asked one by one
+_AFTER: Final = 0.8  # for all of these
 _FIRINGS: Final = 2**15  # of a walk, before a net is reduced for a goal
 _NEXT_MAX: Final = 16
 """Next markings that are asked one by one."""
@@ -212,12 +214,12 @@ class _Parts:
             finding = self._asked(goal[0], self._part(_PART))
             if finding is not None:
                 return finding.reachable is goal[1], finding.witness
-        if (holds := self._in_reduced(formula)) is None:
+        if isinstance(formula, Exists | ForAll) and isinstance(formula.path, Next):
+            holds = self._locally(formula, _NEXT)
+            if holds is None:
+                holds = self._after(formula.path.operand, every=isinstance(formula, ForAll))
+        elif (holds := self._in_reduced(formula)) is None:
             holds = self._bounded(formula)
-        if holds is None:
-            holds = self._locally(formula, _PART)
-        if holds is None and isinstance(formula, Exists | ForAll) and isinstance(formula.path, Next):
-            holds = self._after(formula.path.operand, every=isinstance(formula, ForAll))
         return (self._locally(formula, 1.0) if holds is None else holds), None
 
     def _first(
@@ -260,15 +262,15 @@ class _Parts:
         firable = player.may_fire(self.net.initial_marking)
         if len(firable) > _NEXT_MAX or self.limits.deadline.over or _speaks_of_start(operand):
             return None
-        values = list[bool | None]()
+        values, all_ = list[bool | None](), self._part(_AFTER)
         for number, t in enumerate(firable):
             marking = player.fire(self.net.initial_marking, (t,))
-            goals, until = _Goals(self.goals.reducer.at(marking)), self._part(1 / (len(firable) - number))
-            there = _Parts(goals, until, self.methods)
+            each = replace(all_, deadline=all_.deadline.share(1 / (len(firable) - number)))
+            there = _Parts(_Goals(self.goals.reducer.at(marking)), each, self.methods)
             holds, _ = there._value(operand)
             if holds is not every and holds is not None:
                 return holds
-            if self.limits.deadline.over:
+            if all_.deadline.over:
                 return None
             values.append(holds)
         return None if None in values else every

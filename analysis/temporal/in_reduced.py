@@ -36,7 +36,7 @@ _REDUCING_SHARE: Final = 0.7
 """The part of the time left that the reduction may take."""
 _EXPLORED_MAX: Final = 2**22
 """Markings that are explored before a diagram is made of all, in so much of the time:"""
-_EXPLORING_SHARE: Final = 0.3
+_EXPLORING_SHARE: Final = 0.5
 
 
 class CtlInReduced:
