@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 R = TypeVar("R")
 _KEPT_MAX: Final = 64
+_KEPT_SIZE_MAX: Final = 400_000
+"""Reductions that are kept of a kind, and places and transitions of the net for all of them: some 0.4 kB for each."""
 _REDUCING_SECONDS: Final = 8e-5
 """What it takes for each place and each transition, of large nets."""
 _PROVING_SECONDS: Final = 4e-5
@@ -34,9 +36,10 @@ class Reducer:
         self._facts = facts
         self._are_facts_tried = facts is not None
         self._is_first_goal = True
-        self._goals: _Kept[Reduced] = _Kept()
-        self._runs: _Kept[ReducedRuns] = _Kept()
-        self._branches: _Kept[ReducedBranches] = _Kept()
+        most = max(1, min(_KEPT_MAX, _KEPT_SIZE_MAX // (len(net.places) + len(net.transitions) + 1)))
+        self._goals: _Kept[Reduced] = _Kept(most)
+        self._runs: _Kept[ReducedRuns] = _Kept(most)
+        self._branches: _Kept[ReducedBranches] = _Kept(most)
 
     def at(self, marking: Marking) -> Reducer:
         """The reducer of the net that begins in a reachable marking, of which all that is proved is true as well."""
@@ -89,9 +92,10 @@ class Reducer:
 
 
 class _Kept(Generic[R]):
-    """The reductions of one kind that were asked for last."""
+    """The reductions of one kind that were asked for last, at most so many."""
 
-    def __init__(self) -> None:
+    def __init__(self, most: int) -> None:
+        self._most = most
         self._found: dict[tuple[Formula, ...], R] = {}
 
     def of(self, labels: tuple[Formula, ...], reduced: Callable[[], R], limits: Limits) -> R:
@@ -99,6 +103,6 @@ class _Kept(Generic[R]):
         found = self._found.pop(labels) if labels in self._found else reduced()
         if not limits.deadline.over:
             self._found[labels] = found
-            if len(self._found) > _KEPT_MAX:
+            if len(self._found) > self._most:
                 del self._found[next(iter(self._found))]
         return found

@@ -6,6 +6,7 @@ import random
 from collections import Counter
 from collections.abc import Sequence
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.block_nets import block_net
@@ -17,7 +18,10 @@ from support.ring_nets import ring_nets
 from support.stuttering import stutter_blocks
 from support.temporal_formulas import ctl_formulas
 
+from firable.analysis._engine import IncompleteGraph
+from firable.analysis.deadline import Deadline
 from firable.analysis.goal import Limits
+from firable.analysis.question import Known
 from firable.analysis.reduction.reduce import ReducedBranches, facts_on, reduce_for_branches, reduce_for_runs
 from firable.analysis.reduction.reducer import Reducer
 from firable.analysis.spaces.reachability import explore
@@ -25,9 +29,11 @@ from firable.analysis.temporal.by_parts import decide_ctl_by_parts
 from firable.analysis.temporal.ctl import Ctl, satisfied
 from firable.analysis.temporal.in_reduced import CtlInReduced
 from firable.analysis.temporal.sets import Sets
+from firable.nets.catalogue import catalogue_net
+from firable.nets.catalogue.families import family_net
 from firable.nets.formula import And, Firable, Formula, Holds, Not
 from firable.nets.net import Net, Place, Transition
-from firable.nets.temporal import format_temporal
+from firable.nets.temporal import Temporal, format_temporal, parse_temporal
 from firable.nets.temporal_parts import has_next
 
 NETS = st.one_of(cell_nets(), lively_nets(), ring_nets(signals=True), dense_nets(signals=True))
@@ -61,7 +67,11 @@ def same_branches(net: Net, labels: Sequence[Formula], facts: bool = False) -> R
 def labelled(draw: st.DrawFn, nets: st.SearchStrategy[Net] = NETS) -> tuple[Net, list[Formula]]:
     net = draw(nets)
     places = st.sampled_from([Holds(place.name) for place in net.places])
-    some = [places, places.map(Not), st.builds(lambda one, other: And((one, Not(other))), places, places)]
+    some: list[st.SearchStrategy[Formula]] = [
+        places,
+        places.map(Not),
+        st.builds(lambda one, other: And((one, Not(other))), places, places),
+    ]
     if net.transitions:
         some.append(st.sampled_from([Firable(transition.name) for transition in net.transitions]))
     return net, draw(st.lists(st.one_of(some), min_size=1, max_size=2, unique=True))
@@ -145,3 +155,54 @@ def test_formulas_without_x_have_the_value_that_they_have_over_sets(data: st.Dat
         assert found[0] is expected, format_temporal(formula)
         assert ", after reduction from" in found[1]
     assert decide_ctl_by_parts(net, formula, Limits()).answer.holds is expected
+
+
+class Counting(Reducer):
+    """A reducer that counts for how many formulas it is asked."""
+
+    asked = 0
+
+    def for_branches(self, labels: Sequence[Formula], limits: Limits) -> ReducedBranches:
+        self.asked += 1
+        return super().for_branches(labels, limits)
+
+
+def test_what_was_not_decided_is_asked_again_only_with_twice_the_time() -> None:
+    # Of each of 17 digits the formula says something, so that nothing is left out; 3 kB hold no search.
+    digits = " and ".join(f"EF counter.one{n}" for n in range(17))
+    formula, reducer = parse_temporal(f"AG ({digits})"), Counting(family_net("counter-17"))
+    asked = CtlInReduced(reducer)
+    for seconds, times in ((20.0, 1), (20.0, 1), (30.0, 1), (90.0, 2)):
+        assert asked.decided(formula, Limits(Deadline.after(seconds), memory_bytes=3000)) is None
+        assert reducer.asked == times
+    found = asked.decided(formula, Limits())
+    assert found is not None
+    assert found[0]
+
+
+def test_no_reduction_is_begun_for_what_it_cannot_say_or_in_no_time() -> None:
+    reducer = Counting(catalogue_net("one_robot"))
+    asked = CtlInReduced(reducer)
+    for text in ("AG EX mc.free", "AG EF start", "AG (mc.free or not deadlock)"):
+        assert asked.decided(parse_temporal(text), Limits()) is None
+    assert asked.decided(parse_temporal("AG EF mc.free"), Limits(Deadline.after(0))) is None
+    assert not reducer.asked
+    found = asked.decided(parse_temporal("AG EF mc.free"), Limits())
+    assert found is not None
+    assert found[0]
+
+
+def test_next_markings_are_asked_in_nets_that_begin_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    def gives_up(net: Net, formula: Temporal, limits: Limits) -> Known:
+        raise IncompleteGraph("not in the net itself")
+
+    monkeypatch.setattr("firable.analysis.temporal.by_parts.decide_ctl_on_the_fly", gives_up)
+    # The next marking has a 1 in the first digit alone, which turns to 0 before there is one in the second.
+    net = family_net("counter-17")
+    until = "[counter.one0 and not counter.one1 U counter.zero0 and counter.one1]"
+    for text, holds in ((f"AX (A{until} and AG EF counter.zero0)", True), ("EX E[counter.one0 U counter.one2]", False)):
+        found = decide_ctl_by_parts(net, parse_temporal(text), Limits())
+        assert found.answer.holds is holds
+        assert "after reduction from" in found.method
+        with pytest.raises(IncompleteGraph):
+            decide_ctl_by_parts(net, parse_temporal(text), Limits(Deadline.after(0)))
