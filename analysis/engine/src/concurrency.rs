@@ -27,7 +27,7 @@ const WORDS_MAX: usize = 1 << 28;
 
 /// A symmetric relation of places, a row of bits each.
 #[derive(Debug)]
-pub(crate) struct Concurrency {
+pub struct Concurrency {
     words: usize,
     rows: Vec<u64>,
     /// The places that may be marked at all.
@@ -38,7 +38,7 @@ pub(crate) struct Concurrency {
 
 impl Concurrency {
     /// The relation of a net, or None where it would take too long.
-    pub(crate) fn of(
+    pub fn of(
         places: usize,
         transitions: &[Transition],
         initial: &[u32],
@@ -52,7 +52,7 @@ impl Concurrency {
 
     /// The same of any net, looking at so many words at most, where `bound` has, for each place, the row of those that
     /// may be marked with it, itself among them.
-    pub(crate) fn within(
+    pub fn within(
         words_max: usize,
         places: usize,
         transitions: &[Transition],
@@ -101,19 +101,19 @@ impl Concurrency {
     }
 
     /// Whether two places may be marked together; a place is not concurrent to itself.
-    pub(crate) fn has(&self, one: u32, other: u32) -> bool {
+    pub fn has(&self, one: u32, other: u32) -> bool {
         holds(self.row(one), other)
     }
 
     /// Gives a place the row of another one besides its own.
-    pub(crate) fn join(&mut self, place: u32, other: u32) {
+    pub fn join(&mut self, place: u32, other: u32) {
         for at in 0..self.words {
             self.rows[place as usize * self.words + at] |= self.rows[other as usize * self.words + at];
         }
     }
 
     /// The rows end to end, with each place that may be marked in its own.
-    pub(crate) fn into_rows(mut self) -> Vec<u64> {
+    pub fn into_rows(mut self) -> Vec<u64> {
         for place in 0..(self.rows.len() / self.words) as u32 {
             if holds(&self.marked, place) {
                 self.relate(place, place);

@@ -22,7 +22,7 @@ pub mod budget;
 #[forbid(unsafe_code)]
 pub mod compact;
 #[forbid(unsafe_code)]
-mod concurrency;
+pub mod concurrency;
 #[forbid(unsafe_code)]
 pub mod condensed;
 #[forbid(unsafe_code)]
