@@ -32,6 +32,13 @@ Point = str
 Value = bool | int | float | str
 """What a point holds. A text that means a number or a truth value counts as that (`as_bit`, `as_number`)."""
 
+
+class NoValue(str):
+    """What is shown of a point that has no value: the words for why, such as a status. It is no sign of life."""
+
+    __slots__ = ()
+
+
 TOLD_MAX: Final = 40
 """So much of a text is told that is no value: anybody may publish a picture where a number should be."""
 

@@ -25,9 +25,10 @@ thing that a device gets.
 A connection alone says nothing of a device that has a sign of life (`alive`): a broker, or the server of a control
 whose program stands still, shows what was so once. What is read is held back until that sign has changed on this very
 connection, and nothing is commanded; the last value of an earlier one proves nothing, as it may have changed before the
-device died. Two things do not wait: heartbeats, from which many a device makes its sign of life, and the safe outputs
-with which a run begins or ends, or a connection that is latched. These are written at once, for the device may be
-alive, and once more when it is seen to be, for it may not have been: until then those of the end are not confirmed.
+device died, and neither does a server that says that it has no value yet, or none any more. Two things do not wait:
+heartbeats, from which many a device makes its sign of life, and the safe outputs with which a run begins or ends, or a
+connection that is latched. These are written at once, for the device may be alive, and once more when it is seen to be,
+for it may not have been: until then those of the end are not confirmed.
 
 An error that is no failure of a link is a mistake, in a library or in what is served here. It ends the run, and this
 device is stopped as any other: over a new connection of which nothing is taken, since what it shows may be what nobody
@@ -53,6 +54,7 @@ from firable.executor.drivers.device import (
     Connection,
     DeviceKind,
     LinkError,
+    NoValue,
     Options,
     Owed,
     Point,
@@ -343,8 +345,9 @@ class Kept:
     def _take(self, batch: Sequence[tuple[Point, Value]]) -> None:
         was_alive = self.is_alive
         if self.document.alive is not None:
-            for point, value in batch:
-                if point == self.document.alive.read and value != self.alive_value:
+            signs = (value for point, value in batch if point == self.document.alive.read)
+            for value in signs:
+                if not isinstance(value, NoValue) and value != self.alive_value:
                     self.is_alive |= self.alive_value is not None
                     self.alive_value = value
                     self.alive_seconds = asyncio.get_running_loop().time()

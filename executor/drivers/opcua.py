@@ -3,9 +3,9 @@
 Points are node ids, such as `ns=2;s=Robot.Done` or `ns=3;i=1001`, each in the one spelling that it has: points are
 compared as they are written, and `ns=2;i=05` would be the node of `ns=2;i=5`, and look like another. The server tells
 of changes by a subscription with a queue for each node, so that edges between two of its messages are counted; a value
-whose status is not good is no value. What is written takes the type that its node has. Of several writes the last,
-which is the number of a command, goes out when the others are confirmed, because a server may take those of one
-request in any order.
+whose status is not good is no value, and neither are null and NaN. What is written takes the type that its node has. Of
+several writes the last, which is the number of a command, goes out when the others are confirmed, because a server may
+take those of one request in any order.
 
 A node id names its namespace by an index, and a server that is configured anew, or only started again, may have its
 namespaces in another order: the same index and name are then another node, which would be read as if it were the one.
@@ -46,6 +46,7 @@ from firable.executor.drivers.device import (
     Connection,
     File,
     LinkError,
+    NoValue,
     Options,
     Password,
     Point,
@@ -282,7 +283,8 @@ class OpcUaConnection(Stepwise):
         if isinstance(shown, bool) and status.value & OVERFLOW == OVERFLOW:
             self.told.put_nowait((point, shown))  # how many edges are gone nobody knows, but not fewer than two
             self.told.put_nowait((point, not shown))
-        self.told.put_nowait((point, shown if status.is_good() else status.name))
+        is_value = status.is_good() and value is not None and shown == shown  # NaN is equal to nothing
+        self.told.put_nowait((point, shown if is_value else NoValue(shown if status.is_good() else status.name)))
 
     def status_change_notification(self, status: Any) -> None:
         """The subscription has ended (called by asyncua)."""

@@ -12,7 +12,7 @@ from firable.executor.drivers import kinds
 from firable.executor.drivers.bench import Heard, until
 from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.bound import BoundDriver
-from firable.executor.drivers.device import Point, Value
+from firable.executor.drivers.device import NoValue, Point, Value
 from firable.executor.drivers.driver import Quality
 
 BINDING = """
@@ -123,6 +123,38 @@ def test_a_sign_of_life_that_has_changed_between_two_connections_proves_nothing_
             assert not w.device.is_ready.is_set()
 
     watched(test)
+
+
+def test_a_server_that_has_no_value_of_the_sign_of_life_and_then_the_last_one_shows_no_sign_of_life() -> None:
+    """So a server begins a connection when it has yet to ask, and what it asks may be a program that stands still."""
+
+    async def test(w: Watched) -> None:
+        await w.gone()
+        w.end.show("life", NoValue("BadWaitingForInitialData"))
+        for _ in range(20):
+            await until(lambda: w.device.kept.is_connected, "another connection")
+            for value in (w.signs, NoValue("BadNoCommunication"), w.signs, NoValue("Bad"), w.signs):
+                w.end.show("life", value)
+                await asyncio.sleep(0.01)
+            assert not w.device.is_ready.is_set()
+            w.end.show("life", NoValue("BadWaitingForInitialData"))
+
+    watched(test)
+
+
+def test_a_sign_of_life_that_stands_is_none_though_it_cannot_be_had_now_and_then() -> None:
+    async def test(w: Watched) -> None:
+        await asyncio.sleep(0.01)
+        w.lives()
+        await until(w.device.is_ready.is_set, "the connection")
+        for _ in range(6):
+            w.end.show("life", NoValue("BadNoCommunication"))
+            await asyncio.sleep(0.05)
+            w.end.show("life", w.signs)
+            await asyncio.sleep(0.05)
+        assert not w.device.is_ready.is_set()
+
+    assert "D: not connected: silent: 'life' has not changed within 0.4 s" in watched(test).heard.notes
 
 
 def test_what_was_shown_before_the_sign_of_life_changes_is_told_as_it_stands_then() -> None:

@@ -3,15 +3,18 @@
 import asyncio
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, suppress
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from asyncua import ua
 from asyncua.client.client import Client
+from asyncua.ua.status_codes import StatusCodes
 
 from firable.executor.drivers.bench import PATIENCE_S, Far
 from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.conformance import DriverConformance
-from firable.executor.drivers.device import LinkError, Point, Use, Value, Wanted
+from firable.executor.drivers.device import LinkError, NoValue, Point, Use, Value, Wanted
 from firable.executor.drivers.far_side.machine import ROLES
 from firable.executor.drivers.far_side.opcua_server import OpcUaEnd
 from firable.executor.drivers.opcua import KIND, OpcUaConnection, OpcUaOptions, spelling
@@ -188,6 +191,29 @@ def test_messages_are_missing_where_numbers_are(messages: str, is_lost: bool) ->
         assert connection.told.empty() != is_lost
 
     asyncio.run(main())
+
+
+@pytest.mark.parametrize(
+    ("value", "status", "told", "is_value"),
+    [
+        (17, "Good", 17, True),
+        (17, "BadNoCommunication", "BadNoCommunication", False),
+        (17, "UncertainLastUsableValue", "UncertainLastUsableValue", False),
+        (None, "Good", "None", False),
+        (float("nan"), "Good", "nan", False),
+        (float("inf"), "Good", float("inf"), True),
+    ],
+    ids=str,
+)
+def test_what_is_no_value_of_a_node_is_told_apart(value: Any, status: str, told: Value, is_value: bool) -> None:
+    connection = OpcUaConnection(Client("opc.tcp://127.0.0.1:1/"), Wanted((), 1.0))
+    connection.points["i=85"] = "i=85"
+    code = ua.StatusCode(ua.UInt32(getattr(StatusCodes, status)))
+    shown = ua.MonitoredItemNotification(Value=ua.DataValue(ua.Variant(value), code))
+    connection.datachange_notification(connection._node("i=85"), value, SimpleNamespace(monitored_item=shown))
+    heard = connection.told.get_nowait()
+    assert not isinstance(heard, Exception)
+    assert (heard, isinstance(heard[1], NoValue)) == (("i=85", told), not is_value)
 
 
 def revising(ask: Any, revised_ms: float) -> Any:
