@@ -114,7 +114,9 @@ class Dispatch:
 
     def _overdue(self, place: str, entry: int, sent_at: float) -> None:
         sender = self.run.net.place(place)
-        if sender.within is not None and self.run.paused:  # what follows does when the run is resumed
+        owner = self.run.controllers[str(sender.owner)]
+        # What follows a time limit does when it is over; and that begins anew when a run that is held is resumed.
+        if sender.within is not None and (self.run.paused or owner.held or place in owner.timers.running):
             self.watch(place, entry)
             return
         self.timers.pop(sender.completion or place, None)
