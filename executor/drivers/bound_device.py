@@ -510,6 +510,8 @@ class BoundDevice:
 
     def _watchdog(self, value: Value) -> None:
         tripped = as_bit(value)
+        if tripped is None:  # as a server shows it that has lost the device: who has had no heartbeat meanwhile trips
+            return
         if tripped and self.has_tripped is False:
             self._fault("its watchdog has stopped its machines: it has had no heartbeat")
         elif tripped and self.has_tripped is None:

@@ -182,10 +182,10 @@ class Channel:
             if self.phase is _Phase.HELD and self.untaken.get(number) is order:  # brought late by the connection before
                 self.phase = _Phase.WRITTEN
             self.is_taken |= self.phase in {_Phase.WRITING, _Phase.WRITTEN}
-        if key == "failed" and number != self.failed_before:
-            self.failed_before = None
         if number is None:
             return ()
+        if key == "failed" and number != self.failed_before:
+            self.failed_before = None
         has = self._has(number)
         if key == "taken" or (key == "failed" and number == self.failed_before):
             return has
@@ -210,7 +210,8 @@ class Channel:
             self.phase = _Phase.HELD
         else:
             self.phase = _Phase.WRITTEN
-            return None if self.document.taken is None else self.outstanding.pop(order.number, None)
+            # What cannot be read now has not been forgotten yet; when it can, `forgotten` knows.
+            return None if self.shown.get("taken") is None else self.outstanding.pop(order.number, None)
         return None
 
     def forgotten(self) -> Order | None:

@@ -263,6 +263,8 @@ def test_command_that_a_device_has_had_since_before_a_restart_is_not_told_as_tak
     one.shows("failed", one.number("a", 3))
     assert one.answer("a", 3, stopped=False) is Answer.UNKNOWN  # a person is asked, and no poll may answer instead
     assert one.shows("failed", one.number("a", 3)) == ()  # nor end what that person resumes
+    one.shows("failed", "BadNoCommunication")
+    assert one.shows("failed", one.number("a", 3)) == ()
     one.shows("failed", 0)
     assert one.shows("failed", one.number("a", 3)) == (Outcome(Order("a", 3, one.number("a", 3), ""), Said.FAILED),)
 
@@ -278,6 +280,31 @@ def test_device_that_has_forgotten_a_command_is_not_given_it_again() -> None:
     forgotten = one.connected_again()
     assert forgotten is not None
     assert forgotten.place == "a"
+    assert one.next_writes() is None
+
+
+def test_device_whose_server_has_no_value_of_what_it_has_taken_has_not_forgotten_it() -> None:
+    one = channel("a", answered="a")
+    number = one.number("a", 1)
+    one.send("a", 1, "RUN", ())
+    after(one, taken=0, done=0)
+    one.written()
+    one.shows("taken", number)
+    one.shows("taken", "BadWaitingForInitialData")
+    assert one.connected_again() is None
+    assert one.forgotten() is None
+    one.shows("taken", number)
+    assert one.forgotten() is None
+    assert [told.said for told in one.shows("done", number)] == [Said.DONE]
+
+    one.send("a", 2, "RUN", ())
+    one.next_writes()
+    one.written()
+    one.shows("taken", one.number("a", 2))
+    one.shows("taken", "BadWaitingForInitialData")
+    assert one.connected_again() is None
+    one.shows("taken", 0)
+    assert one.forgotten() == Order("a", 2, one.number("a", 2), "RUN")
     assert one.next_writes() is None
 
 

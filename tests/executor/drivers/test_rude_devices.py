@@ -11,7 +11,7 @@ from firable.executor.drivers.bench import Heard, bench_net, until
 from firable.executor.drivers.binding import SignalDocument, parse_binding
 from firable.executor.drivers.bound import BoundDriver, bound_driver
 from firable.executor.drivers.bound_device import BoundDevice
-from firable.executor.drivers.device import LinkError, Point, Value, Wanted, Writes
+from firable.executor.drivers.device import LinkError, NoValue, Point, Value, Wanted, Writes
 from firable.executor.drivers.driver import Quality
 from firable.executor.drivers.image import Image
 from firable.executor.drivers.keeping import Kept, Nobody
@@ -173,6 +173,23 @@ def test_what_says_nothing_of_a_command_is_told_once_as_long_as_it_does_and_not_
     assert notes == [f"'done' shows {value}, which says nothing of a command" for value in shown]
     device.read((("needed", "y" * 1_000_000),))
     assert len(device.image.readings["M.needed"].why) < 200
+
+
+GUARDED = """{firable_bind: 1, cell: c, devices: {D: {driver: opcua, url: 'opc.tcp://h:4840/',
+heartbeat: {write: s=beat, every_s: 1, tripped: s=tripped}}}}"""
+
+
+def test_a_watchdog_that_trips_while_nobody_can_read_it_is_a_fault_when_it_can_be_read(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    driver = BoundDriver(parse_binding(GUARDED), (), frozenset())
+    device, faults = driver.devices["D"], list[str]()
+    monkeypatch.setattr(device, "_fault", faults.append)
+    for value in (NoValue("BadWaitingForInitialData"), False, NoValue("BadNoCommunication")):
+        device.read((("s=tripped", value),))
+    assert faults == []
+    device.read((("s=tripped", True),))
+    assert faults == ["its watchdog has stopped its machines: it has had no heartbeat"]
 
 
 FORGETFUL = """{firable_bind: 1, cell: c, devices: {D: {driver: mqtt, host: h, grace_s: 3,
