@@ -56,6 +56,11 @@ class _Typed(Protocol):
         """Whether a line has been typed before it was asked for; it is taken."""
         ...
 
+    @property
+    def wants(self) -> bool:
+        """Whether a person wants to say something, who is not asked: the input has a line, or is at its end."""
+        ...
+
 
 class _TypedAtPrompt:
     """Lines that everything waits for."""
@@ -79,6 +84,11 @@ class _TypedAtPrompt:
         """Never: in virtual time a run that runs on is over before anything is typed."""
         return False
 
+    @property
+    def wants(self) -> bool:
+        """Never: everything waits for what is typed."""
+        return False
+
 
 class _TypedMeanwhile:
     """Lines that are read beside the run."""
@@ -87,6 +97,7 @@ class _TypedMeanwhile:
         self.say = say
         self.lines: deque[str] = deque()
         self.ended = threading.Event()
+        self.is_terminal = sys.stdin.isatty()
         threading.Thread(target=self._read, daemon=True).start()
 
     async def asked(self, prompt: str, is_moot: Callable[[], bool]) -> str | None:
@@ -109,6 +120,11 @@ class _TypedMeanwhile:
             self.lines.popleft()
             return True
         return False
+
+    @property
+    def wants(self) -> bool:
+        """Whether a person wants to say something; the lines of a script are answers, each to its question."""
+        return self.is_terminal and (bool(self.lines) or self.ended.is_set())
 
     def _read(self) -> None:
         unfinished = b""
@@ -195,10 +211,13 @@ class _Person:
         return self._is_held() or not self.host.paused
 
     async def _stepped(self) -> bool:
-        """Fire one transition, waiting until one is enabled or the cell is stopped; False where none ever will be."""
+        """Fire one transition, waiting until one is enabled or the cell is stopped; False where none ever will be.
+
+        Whatever is typed while nothing is enabled is heard at once: a stop must not wait until a machine has moved.
+        """
         host = self.host
         while (fired := await host.step()) is None:
-            if self._is_elsewhere():
+            if self._is_elsewhere() or self.typed.wants:
                 return True
             if host.at_rest:
                 return False

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import io
+import os
+import sys
 from collections.abc import Callable, Sequence
 
 import pytest
 from support.cells import decomposition_of
+from support.waiting import PATIENCE_SECONDS, until
 
 from firable.cli import stepping
 from firable.executor.cell.virtual_time import run_in_virtual_time
@@ -69,6 +72,10 @@ class Terminal:
             self.ahead.pop(0)
             return True
         return False
+
+    @property
+    def wants(self) -> bool:
+        return bool(self.ahead)
 
 
 Act = str | Callable[[Terminal], object]
@@ -140,6 +147,40 @@ def resumed(at: Terminal) -> None:
 def resumed_until_somebody_types(at: Terminal) -> None:
     resumed(at)
     asyncio.get_running_loop().call_later(45, at.ahead.append, "")
+
+
+def typed_while_the_next_step_waits(at: Terminal) -> None:
+    asyncio.get_running_loop().call_later(4.5, at.ahead.extend, ("", "s"))  # half a second after its Enter
+
+
+def test_what_is_typed_while_a_step_waits_for_a_machine_is_heard_before_the_machine_moves_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    situation, asked = run(monkeypatch, "", typed_while_the_next_step_waits, "")
+    assert asked == [("[Enter]", 1), *[("[Enter]", 2)] * 3], "the second Enter asks for the same step, and s for none"
+    assert (situation.state, situation.message.split(";")[0]) == (State.STOPPED, "stopped by the operator")
+
+
+@pytest.mark.parametrize("is_terminal", [True, False])
+@pytest.mark.parametrize("typed", ["s\n", ""], ids=["s", "end of input"])
+def test_a_person_is_heard_unasked_and_a_script_is_asked(
+    is_terminal: bool, typed: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    near, far = os.openpty() if is_terminal else os.pipe()[::-1]
+    with os.fdopen(far) as stdin:
+        monkeypatch.setattr(sys, "stdin", stdin)
+        meanwhile = stepping._TypedMeanwhile(lambda *_, **__: None)
+        assert not meanwhile.wants
+        if typed:
+            os.write(near, typed.encode())
+            until(lambda: meanwhile.lines, "the line")
+            assert meanwhile.wants == is_terminal
+        if is_terminal:
+            os.write(near, b"\x04")  # Ctrl-D
+        else:
+            os.close(near)
+        assert meanwhile.ended.wait(PATIENCE_SECONDS)
+        assert meanwhile.wants == is_terminal
 
 
 def test_an_emergency_stop_withdraws_the_question_and_the_way_back_is_typed_in_three_words(
