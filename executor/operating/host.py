@@ -126,6 +126,8 @@ class Host:
         self.is_to_end = False
         """Whether somebody has asked for the end of the run."""
         self.turn = 0
+        self.pauses = 0
+        """How often somebody has said to pause: that ends the steps that were asked for before."""
         self.clock: RunClock | None = None
         self.coalesced = Coalesced(driver)
         self.begin(resume=conduct.resume)
@@ -233,16 +235,19 @@ class Host:
     # What the operator may do
 
     def pause(self) -> bool:
-        """Let nothing fire any more; machines end the command they are at.
+        """Let nothing fire any more, a step that was asked for before neither; machines end the command they are at.
 
         False where the host is latched or stopping, and everything stands for longer than a pause.
         """
         if self.stopping or self.latch is not None:
             return False
+        self.pauses += 1
         if not self.paused:
             if self.acts.is_leaving:
                 self.acts.stay()
             stopping.halt(self, "paused")
+        else:
+            self.acts.permit(0)  # to a step that waits for votes
         return True
 
     def resume(self) -> bool:

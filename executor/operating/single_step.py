@@ -22,21 +22,22 @@ VOTES_SECONDS: Final = 2.0
 async def step(run: Host) -> str | None:
     """While paused, fire one transition; returns its name, or None where none is enabled.
 
-    Whatever else the operator says meanwhile, a stop most of all, ends the step before it fires.
+    Whatever else the operator says meanwhile, a stop most of all, or again to pause, ends the step before it fires.
     """
+    pauses = run.pauses
     async with run.stepping:
         await run.quiet()
         # What any coordinator has decided may enable what another one decides.
-        await _heard(run, lambda: all(one.idle for one in run.coordinators.values()))
+        await _heard(run, pauses, lambda: all(one.idle for one in run.coordinators.values()))
         before = dict(run.recorder.firings)
         names = [*run.coordinators, *run.controllers]
         for name in names[run.turn :] + names[: run.turn]:
-            if not _may_step(run):
+            if not _may_step(run, pauses):
                 return None
             if name in run.controllers:
                 run.acts.fire(name)
             else:
-                await _commit_one(run, name)
+                await _commit_one(run, name, pauses)
             await run.quiet()
             fired = [t for t, count in run.recorder.firings.items() if count > before[t]]
             if fired:
@@ -45,24 +46,25 @@ async def step(run: Host) -> str | None:
         return None
 
 
-def _may_step(run: Host) -> bool:
-    return run.paused and not (run.stopping or run.is_over or run.peers.is_unmet)
+def _may_step(run: Host, pauses: int) -> bool:
+    """Whether a step may go on that was asked for when somebody had paused the run so often."""
+    return run.paused and run.pauses == pauses and not (run.stopping or run.is_over or run.peers.is_unmet)
 
 
-async def _commit_one(run: Host, name: str) -> None:
+async def _commit_one(run: Host, name: str, pauses: int) -> None:
     coordinator = run.coordinators[name]
     run.acts.act(name, coordinator.permit(1))
     try:
         await run.quiet()
-        await _heard(run, lambda: all(one.decided for one in coordinator.rounds.values()))
+        await _heard(run, pauses, lambda: all(one.decided for one in coordinator.rounds.values()))
     finally:
         if run.paused and not run.is_over:
             run.acts.act(name, coordinator.permit(0))
 
 
-async def _heard(run: Host, is_so: Callable[[], bool]) -> None:
+async def _heard(run: Host, pauses: int, is_so: Callable[[], bool]) -> None:
     """Wait for what other hosts have to say: it is on its way."""
     loop = asyncio.get_running_loop()
     end = loop.time() + VOTES_SECONDS
-    while _may_step(run) and not is_so() and loop.time() < end:
+    while _may_step(run, pauses) and not is_so() and loop.time() < end:
         await asyncio.sleep(0.01)

@@ -108,3 +108,20 @@ def test_a_stop_ends_a_step_that_waits_for_other_hosts_before_it_fires(after_sec
         assert centre.recorder.firings == {"go": 1, "come": 0}
 
     paused(operator)
+
+
+@pytest.mark.parametrize("after_seconds", [0.0, 0.1, 0.3, 0.5, 4 * UNDER_WAY_SECONDS])  # the last as votes come
+def test_a_pause_ends_the_steps_that_were_asked_for_before_and_none_that_is_asked_for_after(
+    after_seconds: float,
+) -> None:
+    async def operator(centre: Host) -> None:
+        assert await centre.step() == "go"
+        steps = [asyncio.create_task(centre.step()) for _ in range(3)]
+        await asyncio.sleep(after_seconds)
+        assert centre.pause()
+        steps.append(asyncio.create_task(centre.step()))
+        assert await asyncio.gather(*steps) == [None, None, None, "come"]
+        await asyncio.sleep(2 * VOTES_SECONDS)
+        assert centre.recorder.firings == {"go": 1, "come": 1}
+
+    paused(operator)
