@@ -11,11 +11,12 @@ from collections.abc import Sequence
 from typing import Final
 
 from firable.cli.page.markup import Markup, tag, together
-from firable.cli.page.pieces import badge, hints_said
+from firable.cli.page.pieces import badge, first_of, hints_said
 from firable.cli.text import counted
 from firable.nets.verdict import Status, Verdict, Weight
 
 LISTED_MAX: Final = 300
+_SUBJECTS_MAX: Final = 40
 """How many verdicts of one family are listed; of more, those that are not proved come first."""
 _SAYS: Final = {
     "opens": "a place is opened by a task as the theorem asks, and each resource adds up",
@@ -84,7 +85,6 @@ def _verdict(verdict: Verdict) -> Markup:
     cost = [counted(n, word) for n, word in ((verdict.cost.markings, "marking"), (verdict.cost.edges, "edge")) if n]
     how = ", ".join(["by " + verdict.method, *cost])
     about = verdict.subjects if verdict.status is not Status.PROVED else ()
-    listed = ", ".join(about[:40]) + (f" and {len(about) - 40:,} more" if len(about) > 40 else "")
     return tag(
         "div",
         tag("div", badge(verdict)),
@@ -92,7 +92,7 @@ def _verdict(verdict: Verdict) -> Markup:
             "div",
             tag("p", verdict.statement, cls="what"),
             tag("p", f"{verdict.name}; {how}", cls="code"),
-            tag("p", "about: ", listed) if listed else None,
+            tag("p", "about: ", first_of(about, _SUBJECTS_MAX)) if about else None,
             tag("p", "reached: ", verdict.bound) if verdict.bound and verdict.status is Status.UNKNOWN else None,
             hints_said(verdict),
             tag("p", "evidence: ", ", ".join(verdict.evidence), cls="code") if verdict.evidence else None,

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from firable.cli.page.markup import Markup, raw, tag, together
-from firable.cli.page.pieces import TONES, classes
+from firable.cli.page.pieces import TONES, classes, first_of
 from firable.cli.page.protocol import wrong_told
 from firable.cli.page.sections import refuted, sections
 from firable.cli.page.style import STYLE
@@ -27,6 +27,7 @@ _ASKED: Final = {
     "split": "Split over its controllers",
 }
 _FAILING_MAX: Final = 6
+_NAMED_MAX: Final = 8
 _POLICY: Final = "default-src 'none'; style-src 'unsafe-inline'"
 
 
@@ -88,20 +89,21 @@ def _explored(report: Report) -> str:
 
 
 def _failing(report: Report) -> Markup | None:
-    """What must hold and does not, or ends otherwise than the file expects, each with the way to its run."""
+    """What must hold and does not, or ends otherwise than the file expects, with its run or its subjects."""
     anchors = {verdict.name: f"#{anchor}" for anchor, verdict in refuted(report)}
     failing = [verdict for verdict in report.verdicts if verdict.matters and verdict.outcome is Status.VIOLATED]
-    some = [verdict for verdict in failing if verdict.name in anchors or verdict.expected is not None]
-    if not some:
+    if not failing:
         return None
     lines = []
-    for verdict in some[:_FAILING_MAX]:
+    for verdict in failing[:_FAILING_MAX]:
         where = anchors.get(verdict.name)
         said = tag("a", verdict.statement, href=where) if where else verdict.statement
         told = "" if verdict.expected is None else f": {verdict.status}, where the file expects {verdict.expected}"
-        lines.append(tag("li", tag("span", "✗ ", aria_hidden="true"), said, told))
-    if len(some) > _FAILING_MAX:
-        lines.append(tag("li", f"and {len(some) - _FAILING_MAX:,} more"))
+        about = () if where or verdict.status is Status.PROVED else verdict.subjects
+        named = tag("span", " about: ", first_of(about, _NAMED_MAX), cls="soft") if about else None
+        lines.append(tag("li", tag("span", "✗ ", aria_hidden="true"), said, told, named))
+    if len(failing) > _FAILING_MAX:
+        lines.append(tag("li", f"and {len(failing) - _FAILING_MAX:,} more"))
     return tag("ul", lines, cls="failing", aria_label="what does not hold")
 
 

@@ -27,7 +27,16 @@ def badge(verdict: Verdict) -> Markup:
 
 def hints_said(verdict: Verdict) -> Markup:
     """What to write instead, a paragraph with its code each; nothing where the verdict holds."""
-    return together(*(tag("p", f"[{code}] {hint}", cls="hint") for code, hint in hints_of(verdict)))
+    return together(*(tag("p", f"[{code}] ", in_code(hint), cls="hint") for code, hint in hints_of(verdict)))
+
+
+def in_code(words: str) -> Markup:
+    """Words in which backticks enclose what is typed, as markup that shows it so.
+
+    >>> str(in_code("write `k: proved`"))
+    'write <span class="code">k: proved</span>'
+    """
+    return together(*(tag("span", part, cls="code") if i % 2 else part for i, part in enumerate(words.split("`"))))
 
 
 def status_badge(status: Status) -> Markup:
@@ -62,6 +71,14 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[Content]], *, caption: s
 
 def names(some: Iterable[str]) -> Markup:
     """Names as code, the first of many."""
-    some = tuple(some)
-    more = len(some) - _NAMES_MAX
-    return tag("span", ", ".join(some[:_NAMES_MAX]), f" and {more:,} more" if more > 0 else None, cls="code")
+    return tag("span", first_of(tuple(some), _NAMES_MAX), cls="code")
+
+
+def first_of(some: Sequence[str], most: int) -> str:
+    """The first of some names, and how many more there are.
+
+    >>> first_of(("a", "b", "c"), 2)
+    'a, b and 1 more'
+    """
+    more = len(some) - most
+    return ", ".join(some[:most]) + (f" and {more:,} more" if more > 0 else "")

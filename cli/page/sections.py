@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 from firable.cli.page.listed import family_line, listed
 from firable.cli.page.markup import Content, Markup, raw, tag, together
-from firable.cli.page.pieces import ROWS_MAX, badge, classes, hints_said, names, status_badge, table
+from firable.cli.page.pieces import ROWS_MAX, badge, classes, hints_said, in_code, names, status_badge, table
 from firable.cli.page.protocol import is_of_protocol, lives_on, one_fault, while_dead
 from firable.cli.page.runs import strip
 from firable.cli.page.swimlanes import swimlanes
@@ -218,7 +218,7 @@ def _story(net: Net, verdict: Verdict, told: dict[tuple[object, ...], tuple[str,
     elif changes:
         told[changes] = (verdict.name, anchor)
         cures = (
-            tag("li", "; and ".join(cure.changes), tag("p", f"checked: {outcome_told(cure)}", cls="soft"))
+            tag("li", in_code("; and ".join(cure.changes)), tag("p", f"checked: {outcome_told(cure)}", cls="soft"))
             for cure in verdict.cures
         )
         parts += [tag("p", "What would cure it, each change by itself:"), tag("ul", *cures)]

@@ -377,7 +377,23 @@ def test_what_the_file_expects_is_no_failure_and_a_change_is_told() -> None:
     assert "✗ violated 1 violated 1 changed 2 as expected" in words
     assert "✗ it is known to fail : proved, where the file expects violated" in words
     assert words.index("✗ violated it fails") < words.index("= expected it is known to fail")  # the runs
-    assert "[F3024] the file expects violated, and it is proved; where that is right, write `k: proved`" in words
+    assert "[F3024] the file expects violated, and it is proved; where that is right, write k: proved" in words
+
+
+def test_the_head_names_what_fails_without_a_run_too() -> None:
+    dead = Verdict("quasi-live", Status.VIOLATED, "no transition is dead", "m", subjects=("t1", "t2"))
+    run = Verdict("d", Status.VIOLATED, "it goes on", "m", subjects=("t3",), witness=Witness((("t1",),)))
+    many = replace(dead, name="many", statement="all are good", subjects=tuple(f"t{i}" for i in range(10)))
+    words = Reading(page_of(report_with(dead, run, many))).words.partition("Counterexamples")[0]
+    assert "✗ no transition is dead about: t1, t2 ✗ it goes on ✗ all are good about: t0, t1," in words
+    assert "t6, t7 and 2 more" in words
+
+
+def test_what_is_typed_stands_as_code_in_a_hint() -> None:
+    known = Verdict("k", Status.PROVED, "it fails", "m", expected=Status.VIOLATED)
+    page = page_of(report_with(known))
+    assert 'write <span class="code">k: proved</span> under <span class="code">expect</span>' in page
+    assert "`" not in page
 
 
 def test_a_deadlock_tells_who_waits_for_whom_and_what_would_cure_it(tmp_path: Path) -> None:
@@ -386,7 +402,7 @@ def test_a_deadlock_tells_who_waits_for_whom_and_what_would_cure_it(tmp_path: Pa
     words = Reading(path.read_text("utf-8")).words
     first = "robot.put_mc (putting on MC) waits in G4 for mc.free, which comes from mc.release by G6 and G7"
     second = "waits in G6 for robot.free, which comes from robot.put_mc by G4 and G5"
-    cure = "give G2 the gate `unless: system.processing` checked: 40 markings; cures doomed-markings, live"
+    cure = "give G2 the gate unless: system.processing checked: 40 markings; cures doomed-markings, live"
     at = [words.index(said) for said in ("in a circle, each for the next", first, second, "What would cure it", cure)]
     assert at == sorted(at)
     assert "Cured by the same change as deadlock-free" in words
