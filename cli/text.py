@@ -33,6 +33,8 @@ _HEADINGS = {"required": "must hold", "warning": "warnings", "information": "for
 
 COLUMNS: Final = 120
 """How wide long lists are folded where the output goes to no terminal."""
+SUBJECTS_SHOWN: Final = 12
+"""So many of the names that a violated verdict is about are told."""
 ALIKE_SHOWN: Final = 2
 """Of how many errors with one cause each is told in full; of more, the first is, and the others are counted."""
 _NAMES_SHOWN: Final = 4
@@ -87,6 +89,16 @@ def counted(n: int, word: str) -> str:
     from firable.nets import verdict
 
     return verdict.counted(n, word)
+
+
+def first_of(some: Sequence[str], most: int) -> str:
+    """The first of some names, and how many more there are.
+
+    >>> first_of(("a", "b", "c"), 2)
+    'a, b and 1 more'
+    """
+    more = len(some) - most
+    return ", ".join(some[:most]) + (f" and {more:,} more" if more > 0 else "")
 
 
 def rule(sequence: Sequence[str], by: str) -> str:
@@ -171,8 +183,7 @@ def _reasons(net: Net, verdict: Verdict, told: dict[tuple[object, ...], str], *,
     if status == "unknown" and verdict.bound:
         yield f"reached: {verdict.bound}"
     if status == "violated" and verdict.subjects:
-        more = f" and {len(verdict.subjects) - 12} more" if len(verdict.subjects) > 12 else ""
-        yield f"about: {', '.join(verdict.subjects[:12])}{more}"
+        yield f"about: {first_of(verdict.subjects, SUBJECTS_SHOWN)}"
     if verdict.witness is not None and (verbose or (status == "violated" and verdict.told_as.value == "required")):
         yield from _witness(net, verdict.name, verdict.witness, told)
     for code, hint in hints_of(verdict):

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from typing import Final
 
 from firable.cli.page.markup import Markup, tag, together
-from firable.cli.page.pieces import badge, first_of, hints_said
-from firable.cli.text import counted
+from firable.cli.page.pieces import badge, hints_said
+from firable.cli.text import counted, first_of
 from firable.nets.verdict import Status, Verdict, Weight
 
 LISTED_MAX: Final = 300

@@ -10,12 +10,12 @@ from collections.abc import Sequence
 from typing import Final
 
 from firable.cli.page.markup import Markup, raw, tag, together
-from firable.cli.page.pieces import TONES, classes, first_of
+from firable.cli.page.pieces import TONES, classes
 from firable.cli.page.protocol import wrong_told
 from firable.cli.page.sections import refuted, sections
 from firable.cli.page.style import STYLE
 from firable.cli.report import Report
-from firable.cli.text import counted, endings, good_end
+from firable.cli.text import counted, endings, first_of, good_end
 from firable.nets.source import printable
 from firable.nets.verdict import Status, Verdict, overall
 

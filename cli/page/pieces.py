@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from typing import Final
 
 from firable.cli.page.markup import Content, Markup, tag, together
-from firable.cli.text import SIGNS, mark
+from firable.cli.text import SIGNS, first_of, mark
 from firable.nets.rules import hints_of
 from firable.nets.verdict import Status, Verdict
 
@@ -72,13 +72,3 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[Content]], *, caption: s
 def names(some: Iterable[str]) -> Markup:
     """Names as code, the first of many."""
     return tag("span", first_of(tuple(some), _NAMES_MAX), cls="code")
-
-
-def first_of(some: Sequence[str], most: int) -> str:
-    """The first of some names, and how many more there are.
-
-    >>> first_of(("a", "b", "c"), 2)
-    'a, b and 1 more'
-    """
-    more = len(some) - most
-    return ", ".join(some[:most]) + (f" and {more:,} more" if more > 0 else "")

@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from firable.cli.page.pieces import TONES
 from firable.cli.story import outcome_told
-from firable.cli.text import mark
+from firable.cli.text import SUBJECTS_SHOWN, first_of, mark
 from firable.cli.view.scene import Stage
 from firable.nets.net import Net
 from firable.nets.rules import hints_of
@@ -159,6 +159,7 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
         "fails": verdict.matters and verdict.outcome is Status.VIOLATED,
         "listed": verdict.matters or (verdict.told_as is not Weight.INFORMATION and not verdict.holds),
         "says": verdict.statement,
+        "about": first_of(verdict.subjects, SUBJECTS_SHOWN) if verdict.status is Status.VIOLATED else "",
         "hints": [{"code": code, "says": hint} for code, hint in hints_of(verdict)],
         "cures": [{"changes": list(cure.changes), "checked": outcome_told(cure)} for cure in verdict.cures],
     }

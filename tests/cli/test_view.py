@@ -249,6 +249,8 @@ def test_a_check_tells_codes_hints_and_what_the_file_expects(chromium: Browser, 
         expect(row("contact-free")).to_contain_class("bad")
         expect(row("contact-free")).to_contain_text("F3024 the file expects violated, and it is proved; where")
         expect(row("live").locator(codes)).to_have_text(["F3024", "F3014"])
+        expect(row("live")).to_contain_text("about: G1, G2, ")
+        expect(row("live")).to_contain_text(" and 3 more")
         expect(row("property.restart").locator(codes)).to_have_text(["F3022"])
         expect(row("doomed-markings")).to_contain_class("open")
         expect(row("reversible")).to_have_count(0)  # for information, and nothing is expected of it

@@ -334,7 +334,7 @@ export class Play {
         ...runs.filter((run) => !mine.has(run.name)).map((run) => h("li", {}, h("div", {}, h("b", {}, run.name), h("span", {}, `${run.says}, ${counted(run.firings, "firing")}`)), played(run.name))),
         ...rows.sort((a, b) => rank(a) - rank(b)).map((one) =>
           h("li", { class: one.tone ?? "" },
-            h("div", {}, h("b", {}, h("i", { "aria-hidden": "true" }, one.sign), ` ${one.name}`), h("span", {}, `${one.word}: ${one.says}`), ...one.hints.map(hint)),
+            h("div", {}, h("b", {}, h("i", { "aria-hidden": "true" }, one.sign), ` ${one.name}`), h("span", {}, `${one.word}: ${one.says}`), one.about ? h("span", {}, `about: ${one.about}`) : null, ...one.hints.map(hint)),
             known.has(one.name) ? played(one.name) : null, this.cures(one))),
       ),
     );

@@ -114,6 +114,8 @@ export interface Verdict {
   fails: boolean;
   listed: boolean;
   says: string;
+  /** The places or transitions that violate it, the first of many. */
+  about: string;
   /** What to write instead, where something is not as it should be. */
   hints: { code: string; says: string }[];
   /** Changes that make it hold, each with what checking the changed net has shown. */
