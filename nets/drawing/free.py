@@ -83,7 +83,7 @@ class _Writer:
         self.routes = dict(zip(ends, self.where.routes, strict=True))
         self.owners = [c.name for c in net.controllers if any(place.owner == c.name for place in net.places)]
         plain = [False] * len(net.transitions)
-        items = list(legend_items(net, plain, macros=False, fired=bool(steps)))
+        items = list(legend_items(net, plain, macros=False, fired=bool(steps), stubs=False))
         items += [(f"owner:{i}", f"places of {owner}") for i, owner in enumerate(self.owners)]
         self.width = max(self.where.width + 2 * MARGIN, least_width(net.name, caption), 420.0)
         self.legend = legend_rows(items, self.width)

@@ -14,8 +14,13 @@ from firable.nets.net import Net
 ROW_HEIGHT: Final = 26.0
 
 
-def legend_items(net: Net, is_global: Sequence[bool], *, macros: bool, fired: bool) -> Iterator[tuple[str, str]]:
-    """The signs of a net, each as (sign, words); `is_global` says of each transition whether it is."""
+def legend_items(
+    net: Net, is_global: Sequence[bool], *, macros: bool, fired: bool, stubs: bool = True
+) -> Iterator[tuple[str, str]]:
+    """The signs of a net, each as (sign, words); `is_global` says of each transition whether it is.
+
+    With `stubs` external gates and commands are drawn as such, else they stand in words beside what they belong to.
+    """
     if net.places:
         yield "place", "place, with its token"
     if macros:
@@ -29,11 +34,11 @@ def legend_items(net: Net, is_global: Sequence[bool], *, macros: bool, fired: bo
     if any(transition.inhibitive for transition in net.transitions):
         yield "inhibitive", "inhibitive gate"
     if any(gate.wanted for transition in net.transitions for gate in transition.external):
-        yield "external", "external gate: opens with the signal"
+        yield "external" if stubs else "if", "external gate: opens with the signal"
     if any(not gate.wanted for transition in net.transitions for gate in transition.external):
-        yield "external-inhibitive", "external gate: closes with the signal"
+        yield "external-inhibitive" if stubs else "unless", "external gate: closes with the signal"
     if any(place.command for place in net.places):
-        yield "command", "command sent on entry"
+        yield "command" if stubs else "sent", "command sent on entry"
     if fired:
         yield "fired", "fired, in these steps"
 
@@ -88,8 +93,11 @@ def _sign(sign: str, x: float, y: float) -> Iterator[str]:
         case "external" | "external-inhibitive":
             yield f'<path class="stub" d="M{px(x + 36)} {px(y - 6)}L{px(x + 20)} {px(y + 2)}"/>'
             yield gate_end(x + 20, y + 2, permissive=sign == "external")
-        case "command":
-            yield f'<path class="send" d="M{px(x + 12)} {px(y)}H{px(x + 28)}"/>'
+        case "if" | "unless":
+            yield f'<text class="signal" x="{px(x + 38)}" y="{px(y + 3.5)}" text-anchor="end">{sign}</text>'
+        case "command" | "sent":
+            if sign == "command":
+                yield f'<path class="send" d="M{px(x + 12)} {px(y)}H{px(x + 28)}"/>'
             yield f'<path class="sendhead" d="M{px(x + 34)} {px(y)}l-7 -3.2v6.4z"/>'
 
 

@@ -60,3 +60,15 @@ def test_a_layouter_is_told_how_far_down_a_node_is_and_where_its_lines_should_le
     rows = {name: box.row for name, box in zip(names, seen, strict=True)}
     assert rows["t1"] < rows["system.loading"] < rows["t3"]
     assert {box.core for box in seen} == {30.0, 48.0}
+
+
+def test_the_legend_shows_gates_and_commands_as_the_picture_has_them() -> None:
+    net = catalogue_net("index_table")
+    assert any(not gate.wanted for transition in net.transitions for gate in transition.external)
+    free, lanes = draw_free(net), draw_net(net)
+    words = [text.split(">")[1].split("<")[0] for text in free.split("<text ") if 'class="signal"' in text]
+    assert words[-2:] == ["if", "unless"]
+    assert 'class="stub"' not in free
+    assert 'class="send"' not in free
+    assert 'class="stub"' in lanes
+    assert 'class="send"' in lanes
