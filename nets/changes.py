@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from firable.nets.net import Arbiter, Net, Place, Transition
+from firable.nets.net import Arbiter, ArbitrationRule, Net, Place, Transition
 
 _CAPACITY: Final = "capacity"
 
@@ -134,10 +134,12 @@ def capacity(net: Net, takers: Sequence[str], givers: Sequence[str]) -> Capacity
 def arbitration(among: Sequence[str], taken: Iterable[str]) -> Arbitration:
     """An arbiter of these transitions under a name that none of `taken` is.
 
+    It goes by rotation: by priority this warning would mostly be exchanged for that of a transition that starves.
+
     >>> print(arbitration(["left", "right"], ()))
-    add to `arbiters`: `left_or_right: {among: [left, right], by: priority}`
+    add to `arbiters`: `left_or_right: {among: [left, right], by: rotation}`
     """
-    return Arbitration(Arbiter(free_name("_or_".join(among[:2]), taken), tuple(among)))
+    return Arbitration(Arbiter(free_name("_or_".join(among[:2]), taken), tuple(among), ArbitrationRule.ROTATION))
 
 
 def free_name(wanted: str, taken: Iterable[str]) -> str:

@@ -22,7 +22,7 @@ from firable.nets.catalogue import catalogue_net
 from firable.nets.changes import Arbitration, CapacityPlace, Change, Gate, capacity, changed, free_name
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.editing import edits
-from firable.nets.net import Arbiter, Net, Place, Transition
+from firable.nets.net import Arbiter, ArbitrationRule, Net, Place, Transition
 from firable.nets.printing import format_net, in_file_order
 from firable.nets.queries import Query, parse_query
 from firable.nets.rules import hints_of
@@ -163,7 +163,7 @@ def test_competitors_without_an_arbiter_are_offered_one() -> None:
     (cure,) = _explained(catalogue_net("philosophers-4"))["effective-conflicts"].cures
     assert len(cure.changes) == 4
     assert cure.changes[0] == (
-        "add to `arbiters`: `p1_takes_left_or_p4_takes_right: {among: [p1_takes_left, p4_takes_right], by: priority}`"
+        "add to `arbiters`: `p1_takes_left_or_p4_takes_right: {among: [p1_takes_left, p4_takes_right], by: rotation}`"
     )
 
 
@@ -247,9 +247,10 @@ def _by_hand(net: Net, cure: Cure) -> Net:
             takers, givers = place[2].split(" and "), place[3].split(" and ")
             net = changed(net, [CapacityPlace(place[1], None, tuple(takers), tuple(givers))])
         else:
-            arbiter = re.fullmatch(r"add to `arbiters`: `(\S+): \{among: \[(.+)\], by: priority\}`", change)
+            arbiter = re.fullmatch(r"add to `arbiters`: `(\S+): \{among: \[(.+)\], by: (\w+)\}`", change)
             assert arbiter is not None, change
-            net = replace(net, arbiters=(*net.arbiters, Arbiter(arbiter[1], tuple(arbiter[2].split(", ")))))
+            written = Arbiter(arbiter[1], tuple(arbiter[2].split(", ")), ArbitrationRule(arbiter[3]))
+            net = replace(net, arbiters=(*net.arbiters, written))
     return net
 
 

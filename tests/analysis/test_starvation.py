@@ -73,7 +73,7 @@ def test_an_effective_conflict_warns_only_where_no_arbiter_names_it() -> None:
     assert (unnamed.status, str(unnamed.weight)) == (Status.VIOLATED, "warning")
     assert unnamed.hint == (
         "no arbiter names t1 and t2: the order of the file decides; "
-        "add to `arbiters`: `t1_or_t2: {among: [t1, t2], by: priority}`"
+        "add to `arbiters`: `t1_or_t2: {among: [t1, t2], by: rotation}`"
     )
 
 
@@ -87,7 +87,7 @@ def test_who_competes_beside_an_arbiter_is_bidden_to_stand_in_that_one() -> None
 def test_an_arbiter_that_is_offered_names_all_that_compete_there() -> None:
     net = two_ways()
     net = replace(net, transitions=(*net.transitions, Transition("t5", ("p",), ("a",))))
-    assert "{among: [t1, t2, t5], by: priority}" in check(net).verdict("effective-conflicts").hint
+    assert "{among: [t1, t2, t5], by: rotation}" in check(net).verdict("effective-conflicts").hint
 
 
 @pytest.mark.parametrize(("of_t", "told"), [(True, "t and u"), (False, "u and t")])
