@@ -380,6 +380,9 @@ def _wanted(kind: str, context: Mapping[str, Any], node: Node, path: Path) -> st
             return f"two formulas are expected: `[a, b]`, or `{_FORMS['leads_to']}`"
         case "model_type" if path[-1:] == ("within",):
             return "a time is expected, such as `5s`, or a mapping with `time: 5s`"
+        case "model_type" if path[:-1] == ("signals",):
+            meant = did_you_mean(text, ["acknowledged"])
+            return f"{meant}`{{device: ..., read: ...}}` is expected, or `acknowledged` of a completion"
         case "list_type" | "too_short" if path[-1:] == ("departures",):
             return "`{station: NAME}`, or a list of these, is expected"
         case "dict_type" | "too_short" if path[-1:] == ("next",):

@@ -98,6 +98,14 @@ def test_address_at_which_no_device_can_be_is_refused_where_it_stands(keys: str,
     assert first.span.line == 6
 
 
+@pytest.mark.parametrize(("word", "meant"), [("acknowleged", "did you mean 'acknowledged'? "), ("discrete 2", "")])
+def test_a_signal_that_is_neither_read_nor_acknowledged_is_told_both_ways(word: str, meant: str) -> None:
+    with pytest.raises(InputError) as refused:
+        parse_binding(edited("M.moved: acknowledged", f"M.moved: {word}"))
+    (found,) = refused.value.diagnostics
+    assert found.hint == f"{meant}`{{device: ..., read: ...}}` is expected, or `acknowledged` of a completion"
+
+
 @pytest.mark.parametrize(
     "keys",
     [
