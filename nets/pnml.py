@@ -16,7 +16,7 @@ The ordinary firing rule lets a token pile up where the contact rule blocks; the
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sized
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -27,7 +27,8 @@ from firable.nets.net import Net, Place, Transition
 from firable.nets.pausing import without_cycle_search
 from firable.nets.pnml_writer import write_pnml
 from firable.nets.pnml_xml import PnmlRecords, Record, described, parse_xml
-from firable.nets.source import Source, printable, quoted, read_bytes
+from firable.nets.source import Source, printable, quoted, read_bytes, xml_text
+from firable.nets.verdict import counted
 from firable.nets.well_formed import FORBIDDEN_IN_NAMES, is_name
 
 __all__ = ["PnmlImport", "parse_pnml", "read_pnml", "write_pnml"]
@@ -66,7 +67,7 @@ def parse_pnml(data: bytes | str, file: str = "<pnml>") -> PnmlImport:
     encoding = None
     if isinstance(data, str):
         data, encoding = data.encode("utf-8", "surrogatepass"), "utf-8"
-    source = Source(file, data.decode("utf-8-sig", "replace"))
+    source = Source(file, xml_text(data))
     with without_cycle_search():
         importing = _Import(source, parse_xml(source, data, encoding))
         net = importing.net()
@@ -312,31 +313,32 @@ class _Import:
                 "the net behaves as in the file where the verdict is `contact-free`",
             )
         if self.self_loops:
+            said = _counted(self.self_loops, "transition takes a token and puts", "transitions take a token and put")
             yield note(
-                f"{len(self.self_loops):,} transitions take a token and put it back: {_few(self.self_loops)}",
+                f"{said} it back: {_few(self.self_loops)}",
                 "each such pair of arcs is read as a permissive gate",
             )
         if self.renamed:
             renamed = [f"{quoted(one)} is '{name}'" for one, name in self.renamed.items()]
             yield note(
-                f"{len(self.renamed):,} identifiers are no names here: {_few(renamed)}",
+                f"{_counted(self.renamed, 'identifier is no name', 'identifiers are no names')} here: {_few(renamed)}",
                 "a name has no blanks, brackets, quotes or YAML signs",
             )
         if self.capacities:
             yield note(
-                f"{len(self.capacities):,} places have a capacity above 1: {_few(self.capacities)}",
+                f"{_counted(self.capacities, 'place has', 'places have')} a capacity above 1: {_few(self.capacities)}",
                 "every place holds one token at most here",
             )
         references = sum(record.tag.startswith("reference") for record in self.records.nodes)
         if self.records.pages > 1 or references:
             yield note(
-                f"{self.records.pages:,} pages with {references:,} references are joined to one net",
+                f"{counted(self.records.pages, 'page')} with {counted(references, 'reference')} are joined to one net",
                 "pages are a matter of drawing",
             )
         kinds = sorted(self.records.left.items())
         hint = "drawing, tool data, priorities and rates are no part of a net here"
         for tag, count in kinds[:KINDS_MAX]:
-            yield note(f"{count:,} <{printable_tag(tag)}> are left out", hint)
+            yield note(f"{count:,} <{printable_tag(tag)}> {'is' if count == 1 else 'are'} left out", hint)
         if len(kinds) > KINDS_MAX:
             yield note(f"elements of {len(kinds) - KINDS_MAX:,} other names are left out", hint)
 
@@ -344,6 +346,10 @@ class _Import:
 def printable_tag(tag: str) -> str:
     """The name of an element for a message, without quotes."""
     return quoted(tag)[1:-1]
+
+
+def _counted(items: Sized, one: str, more: str) -> str:
+    return f"1 {one}" if len(items) == 1 else f"{len(items):,} {more}"
 
 
 def _few(items: list[str]) -> str:

@@ -23,7 +23,7 @@ from firable.nets.diagnostics import Diagnostic, InputError, Problems, bounded
 from firable.nets.formula import Compare, Constant, Count, Deadlock, Firable, Formula, FormulaError, Or, Sign
 from firable.nets.net import Net
 from firable.nets.queries import KnownNames, Query, QueryKind
-from firable.nets.source import Source, quoted
+from firable.nets.source import Source, quoted, xml_text
 from firable.nets.temporal import (
     Eventually,
     Exists,
@@ -70,7 +70,7 @@ def parse_property_xml(data: bytes, net: Net, renamed: Mapping[str, str], file: 
     Raises `InputError`: F1002 and F1018 where it is none, F1012 for a mixture of CTL and LTL, F2001 for two queries of
     one name, F2002 and F2004 for unknown places and transitions.
     """
-    source = Source(file, data.decode("utf-8-sig", "replace"))
+    source = Source(file, xml_text(data))
     reading = _Reading(source, net, renamed)
     queries = tuple(reading.queries(parse_elements(source, data, "F1018")))
     if reading.problems:

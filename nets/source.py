@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import re
 import stat
-from codecs import BOM_UTF8
+from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,6 +24,10 @@ EXCERPT_CHARACTERS_MAX: Final = 100
 _PASSWORD: Final = re.compile(r"""(\bpassword["']?\s*:\s*)("(?:[^"\\]|\\.)*"?|'[^']*'?|[^\s'"].*)""")
 """A password in YAML or JSON; what is printed may go anywhere, into the log of a CI run most of all."""
 
+_DECLARED: Final = re.compile(
+    rb"""\A<\?xml\b[^>]*?\sencoding\s*=\s*["'](iso-8859-\d+|us-ascii|windows-\d+)["']""", re.IGNORECASE
+)
+"""The encodings with one byte for a character that an XML file may declare."""
 _BREAK: Final = re.compile(r"\s*[\t-\r\x1c-\x1e\x85\u2028\u2029]\s*")
 _BLANK: Final = re.compile(r"\s")
 """One of any width, or at which no line is broken, as French has before a colon: Python calls it not printable."""
@@ -116,6 +120,21 @@ def source_of(path: str | Path, data: bytes) -> Source:
     if "\0" in text:
         raise _no_text(path, data, (at := data.index(0)), f"not text: byte {at} is NUL")
     return Source(str(path), text)
+
+
+def xml_text(data: bytes) -> str:
+    """The text of an XML file for messages, by the encoding that it declares; what is no text there is marked.
+
+    >>> xml_text('<?xml version="1.0" encoding="ISO-8859-1"?><für/>'.encode("latin-1"))[-6:]
+    '<für/>'
+    """
+    if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
+        return data.decode("utf-16", "replace")
+    declared = _DECLARED.match(data)
+    try:
+        return data.decode(declared[1].decode() if declared else "utf-8-sig", "replace")
+    except LookupError:
+        return data.decode("utf-8-sig", "replace")
 
 
 def _no_text(path: str | Path, data: bytes, at: int, message: str) -> InputError:

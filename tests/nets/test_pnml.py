@@ -107,7 +107,7 @@ def test_the_kind_of_an_arc_may_be_an_attribute(attributes: str, expected: Trans
 def test_a_self_loop_is_a_permissive_gate_and_noted() -> None:
     imported = parse_pnml(pnml(P + Q + T + arc("p", "t") + arc("t", "p") + arc("t", "q")))
     assert imported.net.transitions == (Transition("t", outputs=("q",), permissive=("p",)),)
-    assert messages(imported) == ["1 transitions take a token and put it back: 't'"]
+    assert messages(imported) == ["1 transition takes a token and puts it back: 't'"]
 
 
 def test_markings_and_weights_are_read_in_each_spelling() -> None:
@@ -145,6 +145,14 @@ def test_identifiers_that_are_no_names_are_mapped_without_collision() -> None:
     ]
 
 
+def test_one_of_a_kind_is_told_as_one() -> None:
+    assert messages(parse_pnml(pnml('<place id="a b"/>'))) == ["1 identifier is no name here: 'a b' is 'a_b'"]
+    body = '<page id="1"/><page id="2"><referencePlace id="r" ref="p"/></page>'
+    assert messages(parse_pnml(f'<pnml><net id="n" type="ptnet">{P}{body}</net></pnml>')) == [
+        "2 pages with 1 reference are joined to one net"
+    ]
+
+
 def test_pages_and_references_are_joined() -> None:
     text = (
         '<pnml><net id="n" type="ptnet"><page id="1">' + P + "</page>"
@@ -168,11 +176,11 @@ def test_what_is_left_out_is_counted_by_its_name() -> None:
     imported = parse_pnml(pnml(body))
     assert [place.name for place in imported.net.places] == ["p", "q"]
     assert messages(imported) == [
-        "1 places have a capacity above 1: 'q'",
+        "1 place has a capacity above 1: 'q'",
         "2 <graphics> are left out",
-        "1 <labels> are left out",
-        "1 <rate> are left out",
-        "1 <toolspecific> are left out",
+        "1 <labels> is left out",
+        "1 <rate> is left out",
+        "1 <toolspecific> is left out",
     ]
 
 
@@ -182,6 +190,17 @@ def test_other_encodings_and_prefixes_are_read() -> None:
         '<x:pnml xmlns:x="u"><x:net id="n"><x:place id="Förderer"/></x:net></x:pnml>'
     )
     assert parse_pnml(text.encode("latin-1")).net.places == (Place("Förderer"),)
+
+
+@pytest.mark.parametrize("encoding", ["ISO-8859-1", "windows-1252", "UTF-16", "UTF-8"])
+def test_the_line_of_a_mistake_is_shown_in_the_encoding_of_the_file(encoding: str) -> None:
+    text = f'<?xml version="1.0" encoding="{encoding}"?>\n<pnml><net id="Förderer" type="symmetricnet"/></pnml>'
+    with pytest.raises(InputError) as refused:
+        parse_pnml(text.encode(encoding))
+    (found,) = refused.value.diagnostics
+    assert found.span is not None
+    assert (found.span.line, found.span.column) == (2, 7)
+    assert found.span.excerpt == '<pnml><net id="Förderer" type="symmetricnet"/></pnml>'
 
 
 def test_the_name_of_the_net_is_its_name_or_identifier_or_file() -> None:
