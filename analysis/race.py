@@ -29,6 +29,8 @@ SLICES_SECONDS: Final = (2.0, 10.0, 60.0)
 _GROWTH: Final = 4.0
 """How much longer a slice is than the one before it where the time is short: only the last takes all that is left."""
 _TURN_SECONDS: Final = 0.1
+_CANCELLED: Final = "cancelled"
+"""What the engine says where it was ended from outside, mostly because another technique was first: no giving up."""
 _START_SECONDS: Final = 1.0
 
 
@@ -138,7 +140,8 @@ class _Course(Generic[T]):
         try:
             answer = contestant.run(limits)
         except (BudgetExceeded, IncompleteGraph) as error:
-            self._tell(f"{contestant.name} gave up: {error}")
+            ended = "was ended" if self.answer is None else "was no longer needed"
+            self._tell(f"{contestant.name} {ended if str(error) == _CANCELLED else f'gave up: {error}'}")
             return True
         except BaseException as error:
             with self.lock:

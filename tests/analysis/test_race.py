@@ -53,6 +53,23 @@ def test_a_technique_that_gives_up_leaves_its_lane_to_the_next() -> None:
     assert outcome.told == ("poor gave up: not with 100 bytes",)
 
 
+def test_a_technique_that_is_cancelled_by_the_answer_of_another_has_not_given_up() -> None:
+    begun = Event()
+
+    def cancelled(limits: Limits) -> str:
+        begun.set()
+        while not limits.deadline.over:
+            pass
+        raise BudgetExceeded("cancelled")
+
+    def quick(_: Limits) -> str:
+        begun.wait()
+        return "yes"
+
+    outcome = race([[Contestant("slow", cancelled)], [Contestant("quick", quick)]], Limits())
+    assert outcome.told == ("slow was no longer needed",)
+
+
 def test_lanes_share_the_memory() -> None:
     outcome = race([[Contestant("a", giving_up)], [Contestant("b", giving_up)]], Limits(memory_bytes=100))
     assert outcome.answer is None
