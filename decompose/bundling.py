@@ -237,6 +237,9 @@ def seen_by(verdict: Verdict, net: str = "NET", plant: str = "PLANT") -> str:
 def _unbundled(problem: Diagnostic, lacking: Mapping[str, str], loops: Mapping[str, Verdict]) -> Diagnostic:
     """What keeps a bundle from running, said to who makes it."""
     name = problem.subject[-1]
+    family, _, rest = name.removeprefix("loop.").partition(".")
+    if family == "property":
+        problem = replace(problem, subject=("properties", rest))
     if name in lacking:
         message = f"'{name}' is proved, and there is no evidence that shows it again: {lacking[name]}"
         hint, code = _LESS if is_of_size(lacking[name]) else _MORE, "F4003"

@@ -22,7 +22,7 @@ from firable.decompose.proofs.standing import standing
 from firable.decompose.protocol.parametric.side_conditions import side_conditions
 from firable.decompose.splitting.cut import split
 from firable.nets.bundle import Bundle
-from firable.nets.catalogue import catalogue_names, catalogue_net
+from firable.nets.catalogue import catalogue_names, catalogue_net, catalogue_path
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError
 from firable.nets.net import Controller, ExternalGate, Net, Place, Signal, Transition
@@ -234,6 +234,23 @@ def test_net_is_not_bundled_where_no_evidence_on_it_was_found(
     made = tmp_path / "cell.bundle"
     assert main(["bundle", "catalogue:one_robot", "-o", str(made)]) == (3 if code == "F3004" else 2)
     assert not made.exists()
+
+
+def test_a_property_without_evidence_is_told_at_its_line(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def without(report: CheckReport, queries: Sequence[Query], limits: Limits) -> Document:
+        document = evidence_of_report(report, queries, limits)
+        lacks = "property.restart"
+        records = (replace(r, shown=(), lacking="nothing") if r.name == lacks else r for r in document.records)
+        return replace(document, records=tuple(records))
+
+    monkeypatch.setattr("firable.decompose.bundling.evidence_of_report", without)
+    path = tmp_path / "cell.firable.yaml"
+    path.write_text(catalogue_path("one_robot").read_text("utf-8"), "utf-8")
+    at = next(i for i, line in enumerate(path.read_text("utf-8").splitlines(), 1) if line.startswith("  restart:"))
+    assert main(["bundle", str(path), "-o", str(tmp_path / "cell.bundle")]) == 2
+    assert capsys.readouterr().err.startswith(f"{path}:{at}:3: error[F4003]: 'property.restart' is proved, and there")
 
 
 def test_deadlocking_net_is_not_bundled_with_the_verdicts_on_a_good_one() -> None:
