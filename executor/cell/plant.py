@@ -70,7 +70,6 @@ class CommandDone:
 class PlantFault:
     """Something happened that must not: the machines of the cell stand still from now on."""
 
-    machine: str
     message: str
 
 
@@ -229,24 +228,24 @@ class Plant:
         if self.faulted:
             return []
         self.now_seconds = now_seconds
-        return self._lawful(machine, self._begin(machine, Busy(command, parameters, ticket)))
+        return self._lawful(self._begin(machine, Busy(command, parameters, ticket)))
 
     def advance(self, now_seconds: float) -> list[PlantReport]:
         """Let happen what is due."""
         reports: list[PlantReport] = []
         while self.next_seconds is not None and self.next_seconds <= now_seconds:
             self.now_seconds, _, event = heappop(self.events)
-            reports += self._lawful(event.machine if isinstance(event, FinishDue) else "", self._happen(event))
+            reports += self._lawful(self._happen(event))
         return reports
 
-    def _lawful(self, machine: str, happening: Iterator[PlantReport]) -> list[PlantReport]:
+    def _lawful(self, happening: Iterator[PlantReport]) -> list[PlantReport]:
         reports: list[PlantReport] = []
         try:
             reports.extend(happening)
         except _FaultError as fault:
             self.faulted = True
             self.halt()
-            reports.append(PlantFault(machine, str(fault)))
+            reports.append(PlantFault(str(fault)))
         # What is seen comes before what is acknowledged: a completion is formed from both.
         return [*self._seen(), *reports]
 

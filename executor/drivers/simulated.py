@@ -228,8 +228,8 @@ class SimulatedDriver:
                         place, entry = sent
                         self.done[place.name] = entry
                         self._formed(str(place.completion), self.completions.acknowledged(str(place.completion), entry))
-                case PlantFault(machine, message):
-                    self.listener.driver_fault(machine, message)
+                case PlantFault(message):
+                    self.listener.driver_fault("", message)  # it names the machine
 
     def _sensor(self, at_seconds: float, signal: str, value: bool) -> None:
         self.image[signal] = Reading(value, at_seconds, Quality.GOOD, "")

@@ -79,7 +79,7 @@ def test_an_index_moves_nothing_from_an_empty_station() -> None:
 def test_an_index_that_leads_to_a_full_station_collides() -> None:
     bench = table("{does: index, next: {drill: load}, takes_s: 2}", "{does: index, next: {load: drill}, takes_s: 2}")
     bench.do("T", "BACK")
-    assert bench.faults == ["T: T moves workpiece 3 onto drill, where workpiece 1 lies"]
+    assert bench.faults == ["T moves workpiece 3 onto drill, where workpiece 1 lies"]
 
 
 def test_workpieces_come_to_a_station_only_when_it_is_there() -> None:
@@ -92,7 +92,7 @@ def test_workpieces_come_to_a_station_only_when_it_is_there() -> None:
     bench.give("W", "STEP")
     bench.wait(1.9)
     bench.give("T", "INDEX")
-    assert bench.faults == ["T: T is given INDEX while W moves what lies on unload"]
+    assert bench.faults == ["T is given INDEX while W moves what lies on unload"]
     bench = table("full_at_first: {drill: raw, unload: machined}\n", "", workpieces=5)
     bench.give("T", "INDEX")
     bench.wait(1.9)
@@ -107,7 +107,7 @@ def test_an_index_pulls_at_a_workpiece_that_is_clamped() -> None:
     bench = table()
     bench.do("D", "CLAMP")
     bench.give("T", "INDEX")
-    assert bench.faults == ["T: T is given INDEX, and the workpiece on drill is clamped"]
+    assert bench.faults == ["T is given INDEX, and the workpiece on drill is clamped"]
 
 
 @pytest.mark.parametrize("when_full", ["", ", when_full: wait"])
@@ -118,7 +118,7 @@ def test_whoever_lays_a_workpiece_on_a_station_that_moves_collides(when_full: st
     bench.give("B", "RUN")
     bench.give("T", "INDEX")
     bench.wait(1.0)
-    assert bench.faults == ["B: B pushes workpiece 1 onto load while T moves what lies there"]
+    assert bench.faults == ["B pushes workpiece 1 onto load while T moves what lies there"]
 
 
 def test_an_index_that_was_halted_goes_on_by_the_same_command_alone() -> None:
@@ -133,7 +133,7 @@ def test_an_index_that_was_halted_goes_on_by_the_same_command_alone() -> None:
     bench.give("T", "INDEX")
     bench.plant.halt()
     bench.give("T", "BACK")
-    assert bench.faults == ["T: T is given BACK in the midst of INDEX"]
+    assert bench.faults == ["T is given BACK in the midst of INDEX"]
 
 
 # --- What is switched
@@ -147,7 +147,7 @@ def test_what_is_switched_is_done_at_once_and_keeps_no_machine() -> None:
     assert bench.plant.next_seconds is not None
     bench.give("L", "TEST")
     bench.give("L", "LIGHT")
-    assert bench.faults == ["L: L is given LIGHT while it is at TEST"]
+    assert bench.faults == ["L is given LIGHT while it is at TEST"]
 
 
 # --- Runs, held to the loop

@@ -96,7 +96,7 @@ class Twin:
             self.plant._arrive()
             return []
         if what == "leaves":
-            return self.plant._lawful("", self.departing(of.partition("/")[0]))
+            return self.plant._lawful(self.departing(of.partition("/")[0]))
         if of.startswith("judged/"):
             self.plant.found_good[what] = of == "judged/passes"
             return []
@@ -105,7 +105,7 @@ class Twin:
         machine = self.plant.machines[what]
         busy = machine.breaks_off if of.startswith("still-") else machine.busy
         assert isinstance(busy, Busy)
-        return self.plant._lawful(what, self.plant._happen(FinishDue(what, busy)))
+        return self.plant._lawful(self.plant._happen(FinishDue(what, busy)))
 
     def departing(self, station: str) -> Iterator[PlantReport]:
         leaving = self.plant.stations[station]
@@ -124,7 +124,7 @@ class Twin:
             later = deepcopy(self.plant)
             busy = later.machines[name].busy
             assert busy is not None
-            later._lawful(name, later._happen(FinishDue(name, busy)))
+            later._lawful(later._happen(FinishDue(name, busy)))
             waits = later.machines[name].busy
             assert ends == (waits is None or not waits.waits), f"{name} at {busy.command}"
 

@@ -73,4 +73,4 @@ class Bench:
 
     @property
     def faults(self) -> list[str]:
-        return [f"{report.machine}: {report.message}" for report in self.reports if isinstance(report, PlantFault)]
+        return [report.message for report in self.reports if isinstance(report, PlantFault)]

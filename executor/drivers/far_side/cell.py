@@ -250,8 +250,8 @@ class CellServer:
                         device, channel, number = waiting
                         self.at = {machine: one for machine, one in self.at.items() if one is not waiting}
                         self._say(device, channel, channel.document.done, number)
-                case PlantFault(machine, message):
-                    self.fault = f"{machine}: {message}" if machine else message
+                case PlantFault(message):
+                    self.fault = message
                     self.tell(self.now_seconds(), self.fault)
                     for device in self.devices.values():
                         self._stop(device, "what has happened")
