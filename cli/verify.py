@@ -159,7 +159,7 @@ def _verdict(document: Document, checked: CheckedRecord) -> Verdict:
     from firable.nets.verdict import NOTHING, Status, Verdict
 
     record = checked.record
-    said = f"it {'holds' if record.proved else 'is violated'}{_of(record)}: " if record.name else ""
+    said = f"it {'holds' if record.proved else 'is violated'}{_of(record, _claimed(record))}: " if record.name else ""
     late = checked.only_claimed and not checked.only_claimed.startswith("only claimed")
     return Verdict(
         record.name or "evidence",
@@ -187,11 +187,17 @@ def _claim(document: Document, checked: CheckedRecord) -> Verdict:
     told_alone = not record.name or DEAD in document.net.place_index
     weight = Weight.INFORMATION if told_alone else next(one for one in Weight if one in weights)
     status = Status.PROVED if record.proved else Status.VIOLATED
-    return Verdict(record.name, status, f"{_claimed(record) or sentence}{_of(record)}", "claimed", weight)
+    said = _claimed(record) or sentence
+    return Verdict(record.name, status, f"{said}{_of(record, _claimed(record))}", "claimed", weight)
 
 
-def _of(record: Record) -> str:
-    return f" ({record.query})" if record.query else ""
+def _of(record: Record, said: str) -> str:
+    """The query that a record answers, unless what is said of it is the formula itself or that it does not hold."""
+    logic, _, formula = record.query.partition(" ")
+    named = f"{logic.upper()}: "
+    denied = {f"{named}not {formula}", f"{named}not ({formula})", f"a run does not satisfy {named}{formula}"}
+    is_said = said in {f"{named}{formula}", *denied}
+    return f" ({record.query})" if record.query and not is_said else ""
 
 
 def _claimed(record: Record) -> str:

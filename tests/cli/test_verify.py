@@ -164,6 +164,22 @@ def test_all_that_check_decides_of_a_cell_is_verified(
     assert {v["status"] for v in verified["verdicts"]} == {"proved"}
 
 
+def test_the_formula_of_a_query_is_told_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    queries = ("AG EF start", "EF p1.eating and p2.eating", "F p1.eating", "bound tokens(p1.eating, p2.eating)")
+    asked = [word for query in queries for word in ("--query", query)]
+    net = "catalogue:philosophers-2"
+    main(["check", net, *asked, "--evidence", str(tmp_path), "--no-cache"])
+    capsys.readouterr()
+    assert main(["verify", *map(str, tmp_path.iterdir())]) == 0
+    told = [line.split("  ")[-1] for line in capsys.readouterr().out.splitlines() if "query.query-" in line]
+    assert told[:3] == [
+        "CTL: not AG EF start",
+        "CTL: not (EF p1.eating and p2.eating)",
+        "a run does not satisfy LTL: F p1.eating",
+    ]
+    assert told[3].endswith("(bound tokens(p1.eating, p2.eating))")
+
+
 def test_the_evidence_of_a_deadlock_is_the_way_into_it(tmp_path: Path) -> None:
     assert main(["check", "catalogue:one_robot_mc_late", "--evidence", str(tmp_path), "--no-cache"]) == 1
     (path,) = tmp_path.iterdir()
