@@ -128,18 +128,19 @@ def _misfits_of_places(model: PlantModel, net: Net) -> Iterator[Diagnostic]:
             message = f"{sent} and waits for '{place.completion}', and nothing comes back of what is switched"
             yield model.misfit(inner, subject, message, hint)
         needed = {"move": "to", "grasp": "at", "put": "at"}.get(action.does)
-        if needed and parameters.get(needed) not in known.positions:
-            message = f"{sent}: '{needed}' is no position of '{command.machine}'"
-            hint = f"its positions are {', '.join(known.positions)}"
+        if needed and (named := parameters.get(needed, "")) not in known.positions:
+            hint = f"{did_you_mean(named, list(known.positions))}its positions are {', '.join(known.positions)}"
+            message = f"{sent}, and '{named}' is no position of '{command.machine}'"
+            if not named:
+                message = f"{sent} without `{needed}`, a position of '{command.machine}'"
             yield model.misfit(("machines", command.machine, "positions"), subject, message, hint)
 
 
 def _misfits_of_signals(model: PlantModel, net: Net) -> Iterator[Diagnostic]:
     for signal in net.signals:
         if signal.kind is SignalKind.SENSOR and signal.name not in model.sensors:
-            hint = (
-                f"{did_you_mean(signal.name, list(model.sensors))}add it to the `sensors` of the plant file, as {SEEN}"
-            )
+            unknown = [name for name in model.sensors if name not in net.signal_index]
+            hint = f"{did_you_mean(signal.name, unknown)}add it to the `sensors` of the plant file, as {SEEN}"
             message = f"no sensor of the plant drives '{signal.name}'"
             yield model.misfit(("sensors",), ("signals", signal.name), message, hint)
     for name, sensor in model.sensors.items():

@@ -12,6 +12,7 @@ from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.diagnostics import InputError, Severity
 from firable.nets.machines.fitting import late_limits, misfits, otherwise_than
 from firable.nets.machines.plant_file import parse_plant, read_plant
+from firable.nets.text import parse_net
 
 CELLS = [
     *("one_robot", "one_robot_mc_late", "one_robot_mc_late_capacity", "two_robots_shared", "two_robots_separate"),
@@ -416,6 +417,36 @@ def test_hint_at_a_sensor_that_the_plant_lacks_names_all_that_one_can_see() -> N
     lacking = parse_plant(plant_path("one_robot").read_text("utf-8").replace("  mc.part_present:", "  mc.part:"))
     hint = next(one.hint for one in misfits(lacking, catalogue_net("one_robot")) if "drives" in one.message)
     assert all(f"`{kind}: " in hint for kind in ("occupied", "holding", "acknowledges", "passes", "fails"))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sent"),
+    [
+        ("CV1: cv1_end", "CVI: cv1_end", "'R MOVE to=CV1', and 'CV1' is no position of 'R'"),
+        ("MOVE:    {does: move,", "MOVE:    {does: grasp,", "'R MOVE to=CV1' without `at`, a position of 'R'"),
+    ],
+)
+def test_a_command_at_no_position_says_which_is_none(old: str, new: str, sent: str) -> None:
+    text = catalogue_path("one_robot").with_name("one_robot.plant.yaml").read_text("utf-8")
+    first, *_ = misfits(parse_plant(text.replace(old, new)), catalogue_net("one_robot"))
+    assert first.message == f"'robot.to_cv1' sends {sent}"
+    assert first.hint.endswith("its positions are HOME, CVI, MC, CV2" if "CVI" in new else "HOME, CV1, MC, CV2")
+
+
+def test_a_signal_without_a_sensor_is_meant_by_a_sensor_without_a_signal() -> None:
+    net = parse_net(
+        "firable: 1\ncell: c\ncontrollers: {in: {start: a, inputs: [box_ok, box_nok], places: {a: , b: }}}\n"
+        "transitions: {t: {from: in.a, to: in.b, if: [in.box_ok, in.box_nok]}}\n"
+    )
+    plant = (
+        "firable_plant: 1\nplant: c\nstations: [s]\narrivals: {station: s, every_s: 1}\n"
+        "departures: {station: s, after_s: 1}\nmachines: {}\n"
+        "sensors: {in.box_nok: {fails: s}, in.box_okay: {passes: s}}\n"
+    )
+    hints = [one.hint.partition("?")[0] for one in misfits(parse_plant(plant), net)]
+    assert hints == ["did you mean 'in.box_okay'", "did you mean 'in.box_ok'"]
+    (hint,) = [one.hint for one in misfits(parse_plant(plant.replace(", in.box_okay: {passes: s}", "")), net)]
+    assert hint.startswith("add it"), "`in.box_nok` is another signal"
 
 
 @pytest.mark.parametrize(
