@@ -163,6 +163,7 @@ def _report(asked: _Asked, ended: Event) -> Report:
     from firable.decompose.bundling import SECONDS, UnbundledError, make_bundle
     from firable.nets.blocked_timeouts import blocked_timeouts
     from firable.nets.bundle import write_bundle
+    from firable.nets.oversights import overseen
     from firable.nets.verdict import Status, overall
 
     loaded, allowed = load_net(asked.net), asked.allowed
@@ -177,7 +178,7 @@ def _report(asked: _Asked, ended: Event) -> Report:
         loaded.net,
         found.verdicts,
         figures=figures,
-        notes=(*loaded.notes, *late),
+        notes=(*loaded.notes, *overseen(loaded), *late),
         positions=loaded.positions,
     )
     if overall(unmade.verdicts) is not Status.PROVED:

@@ -209,6 +209,7 @@ def _refuse_beside_machines() -> None:
 
 def _report(argument: str, asked: _Asked, evidence_dir: str | None, *, bind: str | None, many: bool) -> Report:
     from firable.cli.cache import key_of, opened_cache
+    from firable.nets.oversights import overseen
     from firable.nets.verdict import held_to
 
     loaded = load_found(argument)
@@ -244,7 +245,7 @@ def _report(argument: str, asked: _Asked, evidence_dir: str | None, *, bind: str
         discipline=asked.discipline,
         figures=kept.figures,
         course=kept.course,
-        notes=(*loaded.notes, *of_binding),
+        notes=(*loaded.notes, *overseen(loaded), *of_binding),
         files=files,
         binding=bind or "",
         again=again,

@@ -105,6 +105,7 @@ def loop_report(
     from firable.analysis.loop.faults import ask_faults
     from firable.analysis.loop.verdicts import check_loop
     from firable.nets.machines.fitting import late_limits
+    from firable.nets.oversights import overseen
     from firable.nets.verdict import held_to
 
     loaded = load_found(argument)
@@ -134,7 +135,7 @@ def loop_report(
         loaded.net,
         verdicts,
         discipline="interleaving",
-        notes=(*loaded.notes, *of_binding, *late_limits(model, loaded.net)),
+        notes=(*loaded.notes, *overseen(loaded), *of_binding, *late_limits(model, loaded.net)),
         course=course,
         files=files,
         binding=bind or "",

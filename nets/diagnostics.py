@@ -89,6 +89,8 @@ CODES: Final[dict[str, str]] = {
     "F2028": "a time limit without a completion",
     "F2029": "not a time limit",
     "F2030": "an expectation of an unknown verdict",
+    "F2031": "a place that nothing fills",
+    "F2032": "a command that the next one overtakes",
     # F3: analysis
     "F3001": "a machine is started that no command ever stops",
     "F3002": "an output signal on a place marked in M0",

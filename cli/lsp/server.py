@@ -173,11 +173,12 @@ class NetServer(LanguageServer):
 
     def told(self, uri: str, found: CheckReport, verdicts: tuple[Verdict, ...], positions: Positions) -> list[_Told]:
         """The verdicts on a net that matter and do not hold, each with the changes that cure it."""
+        from firable.nets.oversights import oversights
         from firable.nets.verdict import Status, held_to
 
         net = found.net
         report = Report("check", uri, net, held_to(net.expected, verdicts), positions=positions)
-        told = []
+        told: list[_Told] = [(self.diagnostic(uri, one), ()) for one in positions.place(oversights(net))]
         for alert in alerts(report):
             verdict = alert.verdict
             if verdict.status is Status.UNKNOWN:

@@ -359,6 +359,19 @@ def test_what_the_file_expects_of_no_verdict_is_told_at_its_place(tmp_path: Path
     within(tmp_path / "cell.firable.yaml", act)
 
 
+def test_a_place_that_nothing_fills_is_told_at_its_place(tmp_path: Path, within: Within) -> None:
+    head = "firable: 1\ncell: c\nplaces: {a: , b: , lost: }\nstart: a\n"
+    text = f"{head}transitions:\n  t: {{from: a, to: b}}\n  u: {{from: b, to: a}}\n"
+
+    async def act(one: Editor) -> None:
+        one.open(text)
+        (told,) = await one.told(bool)
+        assert (told.code, told.severity) == ("F2031", lsp.DiagnosticSeverity.Warning)
+        assert (told.range.start.line, told.range.start.character) == (2, 19)
+
+    within(tmp_path / "cell.firable.yaml", act)
+
+
 def test_a_controller_tells_how_many_places_and_signals_it_has() -> None:
     net = Net("n", (Place("c.p", owner="c"),), (), controllers=(Controller("c"),))
     assert "A controller with 1 place and 0 signals." in hover(net, Occurrence(Kind.CONTROLLER, "c", 1, 1, 1))
