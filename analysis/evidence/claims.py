@@ -71,6 +71,10 @@ class Claim:
     >>> from firable.nets.formula import parse_formula
     >>> str(Claim(ClaimKind.NEVER, parse_formula("deadlock")))
     'never (deadlock)'
+    >>> str(Claim(ClaimKind.FIRES, fires=("t1", "t2")))
+    'a run fires t1, t2'
+    >>> str(Claim(ClaimKind.FIRES, parse_formula("p"), fires=("t1",)))
+    'a run meets (p) and then fires t1'
     """
 
     kind: ClaimKind
@@ -81,12 +85,13 @@ class Claim:
 
     def __str__(self) -> str:
         goal = format_temporal(self.goal)
+        fires = "fires" if self.goal == TRUE else f"meets ({goal}) and then fires"
         match self.kind:
             case ClaimKind.FIRES:
                 shown = ", ".join(self.fires[:8]) + (f" and {len(self.fires) - 8} more" if len(self.fires) > 8 else "")
-                return f"a run meets ({goal}) and then fires {shown}"
+                return f"a run {fires} {shown}"
             case ClaimKind.IN_ORDER:
-                return f"a run meets ({goal}) and then fires {', and later '.join(self.fires)}"
+                return f"a run {fires} {', and later '.join(self.fires)}"
             case ClaimKind.LATER:
                 return f"a run meets ({goal}) and then or later ({format_formula(self.then)})"
             case ClaimKind.LEADS_TO | ClaimKind.NOT_LEADS_TO:
