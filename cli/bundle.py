@@ -233,9 +233,7 @@ def _told(verdict: Verdict, asked: _Asked) -> Verdict:
 
 
 def _show(report: Report) -> None:
-    for note in report.notes:
-        if note.code != _UNMADE:
-            text.show_diagnostic(note)
+    text.show_diagnostics(note for note in report.notes if note.code != _UNMADE)
     text.heading(report.net, report.input)
     # What is told for information has its place in `check` and `split`; a warning is told wherever it is counted.
     told = [v for v in report.verdicts if not v.holds and (not report.files or v.weight.value == "warning")]

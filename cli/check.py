@@ -330,8 +330,7 @@ def _evidence(found: CheckReport, queries: Sequence[Query], asked: _Asked) -> di
 
 
 def _show(report: Report, *, verbose: bool) -> None:
-    for note in report.notes:
-        text.show_diagnostic(note)
+    text.show_diagnostics(report.notes)
     text.heading(report.net, report.input)
     figures = report.figures
     words = {"interleaving": "interleaving", "step": "synchronous steps"}[report.discipline]

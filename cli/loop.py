@@ -179,8 +179,7 @@ def show_binding(report: Report) -> None:
 
 def show_loop(report: Report, *, verbose: bool) -> None:
     """Print the report on a net with its machines."""
-    for note in report.notes:
-        text.show_diagnostic(note)
+    text.show_diagnostics(report.notes)
     loop = report.loop
     click.echo(f"{click.style(report.net.name, bold=True)}  {click.style(report.input, dim=True)}")
     click.echo(f"  with its machines: {loop['machines']}")

@@ -23,7 +23,7 @@ import click
 
 from firable import __version__
 from firable.cli.report import ExitCode, exit_code_of, worst
-from firable.cli.text import show_errors
+from firable.cli.text import show_diagnostics
 
 EXTRAS = {
     **dict.fromkeys(
@@ -237,7 +237,7 @@ def _ended_by(error: Exception, arguments: Sequence[str]) -> int:
             error.show()
             return ExitCode.INPUT_ERROR
         case InputError():
-            show_errors(error.diagnostics)
+            show_diagnostics(error.diagnostics)
             return worst(map(exit_code_of, error.diagnostics))
         case ModuleNotFoundError() if error.name and error.name.partition(".")[0] in EXTRAS:
             extra, what = EXTRAS[error.name.partition(".")[0]]
@@ -254,7 +254,7 @@ def _ended_by(error: Exception, arguments: Sequence[str]) -> int:
             # Whoever writes a file has said which: this is what is printed.
             _to_nowhere(sys.stdout)
             message = f"standard output cannot be written: {error.strerror}"
-            show_errors([Diagnostic("F1017", message, "make room where it goes, or send it elsewhere")])
+            show_diagnostics([Diagnostic("F1017", message, "make room where it goes, or send it elsewhere")])
             return ExitCode.INPUT_ERROR
         case MemoryError():
             click.echo("unknown: the memory of this machine is used up\n  hint: --max-memory sets a bound", err=True)

@@ -319,7 +319,7 @@ def answer_all(
 
     Where nobody reads what is printed any more (`firable check ... | head`), the files that are asked for still are.
     """
-    from firable.cli.text import show_errors
+    from firable.cli.text import show_diagnostics
     from firable.nets.diagnostics import InputError
 
     written: Sequence[tuple[str, str]] = click.get_current_context().meta.get(_WRITTEN, ())
@@ -343,7 +343,7 @@ def answer_all(
         except InputError as error:
             errors += error.diagnostics
             if as_text:
-                tell(partial(show_errors, error.diagnostics))
+                tell(partial(show_diagnostics, error.diagnostics))
             continue
         reports.append(report)
         if as_text and unread is None:

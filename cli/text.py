@@ -41,8 +41,8 @@ _NAMES_SHOWN: Final = 4
 _QUOTED: Final = re.compile(r"'[^']*'")
 
 
-def show_errors(diagnostics: Iterable[Diagnostic]) -> None:
-    """Print why an input is refused, to standard error: what differs in names alone once, with how many there are."""
+def show_diagnostics(diagnostics: Iterable[Diagnostic]) -> None:
+    """Print what is wrong or questionable, to standard error: what differs in names alone once, and how many more."""
     causes: dict[tuple[str, ...], list[Diagnostic]] = {}
     for diagnostic in diagnostics:
         causes.setdefault(_cause(diagnostic), []).append(diagnostic)

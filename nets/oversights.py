@@ -32,8 +32,7 @@ def oversights(net: Net) -> Iterator[Diagnostic]:
     for p, place in enumerate(net.places):
         if not (place.marked or net.producers[p] or net.consumers[p] or place.name in read):
             message = f"'{place.name}' is empty at the start, and no transition brings a token to it"
-            closes = f"a gate `unless: {place.name}` never closes"
-            hint = f"add the arc that is missing (`to`), or delete the place: {closes}"
+            hint = "add the arc that is missing (`to`), or delete the place: a gate `unless` of it never closes"
             yield _warning("F2031", message, hint, place.name)
         if place.command is None or place.completion is not None:
             continue
