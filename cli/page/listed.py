@@ -16,8 +16,8 @@ from firable.cli.text import counted, first_of
 from firable.nets.verdict import Status, Verdict, Weight
 
 LISTED_MAX: Final = 300
-_SUBJECTS_MAX: Final = 40
 """How many verdicts of one family are listed; of more, those that are not proved come first."""
+_SUBJECTS_MAX: Final = 40
 _SAYS: Final = {
     "opens": "a place is opened by a task as the theorem asks, and each resource adds up",
 }
