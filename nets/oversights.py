@@ -34,9 +34,9 @@ def oversights(net: Net) -> Iterator[Diagnostic]:
             message = f"'{place.name}' is empty at the start, and no transition brings a token to it"
             hint = "add the arc that is missing (`to`), or delete the place: a gate `unless` of it never closes"
             yield _warning("F2031", message, hint, place.name)
-        if place.command is None or place.completion is not None:
+        if place.command is None:
             continue
-        for t in net.consumers[p]:
+        for t in net.consumers[p]:  # which wait for the completion of the command, where there is one
             transition = net.transitions[t]
             gates = (*transition.permissive, *transition.inhibitive, *transition.external)
             if gates or transition.inputs != (place.name,):

@@ -56,6 +56,7 @@ def test_a_command_that_is_waited_for_or_goes_to_another_machine_is_not_overtake
         ("start: home", "start: [home, zone]"),
         ("to: r.home}", "to: [r.home, r.zone]}"),
         ("unless: r.zone", "if: r.zone"),  # it is dead, which `quasi-live` tells
+        ("from: r.home, to: r.out, unless: r.zone", "from: [r.home, r.zone], to: r.out"),  # so here
     ],
 )
 def test_a_place_that_is_filled_or_whose_transitions_are_dead_is_not_told(old: str, new: str) -> None:
