@@ -38,7 +38,7 @@ from firable.nets.drawing.shapes import (
 )
 from firable.nets.drawing.sheet import least_width, opening
 from firable.nets.drawing.styles import STYLE
-from firable.nets.drawing.text import COMMAND
+from firable.nets.drawing.text import COMMAND, width_of
 from firable.nets.drawing.wrapping import Panel, wrapped_panels
 from firable.nets.drawing.xml import esc, head, ident, px
 from firable.nets.net import Marking, Net
@@ -151,10 +151,22 @@ class _Writer:
 
     def _tie(self, bar: Bar) -> Iterator[str]:
         y = px(bar.y)
-        if bar.in_margin:
-            yield f'<path class="leader" d="M{px(24 + self.where.margin_labels + 8)} {y}H{px(bar.segments[0][0])}"/>'
+        if bar.in_margin and (leader := self._leader(bar)):
+            yield f'<path class="leader" d="{leader}"/>'
         if len(bar.segments) > 1:
             yield f'<path class="tie" d="M{px(bar.segments[0][1])} {y}H{px(bar.segments[-1][0])}"/>'
+
+    def _leader(self, bar: Bar) -> str:
+        """The line from a name in the margin to its bar, left out where a bar that is none of it stands in the row."""
+        x, end, y = 24 + self.where.margin_labels + 8, bar.segments[0][0], px(bar.y)
+        found = ""
+        for other in sorted(self.where.bars, key=lambda one: one.segments[0][0]):
+            left, right = other.segments[0][0] - 14, other.segments[-1][1] + 14
+            if other.in_margin or other.y != bar.y or left > end:
+                continue
+            found += f"M{px(x)} {y}H{px(left)}" if left > x else ""
+            x = max(x, right + width_of(*other.words[0]))
+        return found + (f"M{px(x)} {y}H{px(end)}" if end > x else "")
 
     def _path(self, edge: Edge) -> str:
         """The line of an edge from the circle to the bar."""

@@ -1,5 +1,6 @@
 """Drawings: complete, deterministic, and readable by construction whatever the net."""
 
+import re
 import xml.etree.ElementTree as ET
 from urllib.parse import quote
 
@@ -13,6 +14,7 @@ from firable.nets.drawing import draw_net
 from firable.nets.drawing.layout import layout
 from firable.nets.drawing.rows import lane_order, rows_of
 from firable.nets.drawing.shapes import LABEL_LEFT, RADIUS, STUB_LINE, WORDS_LINE
+from firable.nets.drawing.text import width_of
 from firable.nets.net import Command, Controller, ExternalGate, Net, Place, Signal, Transition
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -44,6 +46,23 @@ def test_everything_of_a_cell_is_drawn(name: str) -> None:
 def test_the_same_net_gives_the_same_picture() -> None:
     net = catalogue_net("one_robot")
     assert draw_net(net) == draw_net(net)
+
+
+def test_a_leader_goes_on_behind_the_bar_of_another_transition() -> None:
+    names = ("a", "b", "c")
+    places = tuple(Place(f"{owner}.{p}", owner, marked=p == "p") for owner in names for p in "pqr")
+    transitions = (
+        Transition("first", ("a.p", "b.p"), ("a.q", "b.q")),
+        Transition("second", ("b.q", "c.p"), ("b.r", "c.q")),
+        Transition("local", ("a.q",), ("a.r",)),
+    )
+    net = Net("n", places, transitions, controllers=tuple(map(Controller, names)))
+    (second,) = [
+        one.get("d", "") for one in elements(draw_net(net), "path", "leader") if one.get("d", "").count("M") == 2
+    ]
+    ends = [float(x) for x in re.findall(r"[MH]([\d.]+)", second)]
+    local = layout(net).bars[2]
+    assert ends[1] < local.segments[0][0] < local.segments[-1][1] + 8 + width_of(*local.words[0]) < ends[2] < ends[3]
 
 
 @examples(25)
