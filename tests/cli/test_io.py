@@ -468,6 +468,11 @@ def beyond(text: str, keys: str) -> str:
             "'modbus' has the parity E, and a pseudo-terminal has none",
         ),
         ("serial", "    driver: simulated\n", "`driver: simulated` leads to nothing that can be served on this host"),
+        (
+            "serial",
+            "    driver: simulated\n",
+            "hint: the cell that is served has all machines of the net: give these a",
+        ),
     ],
 )
 def test_device_that_nobody_would_reach_here_is_refused(

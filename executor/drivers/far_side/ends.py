@@ -176,7 +176,10 @@ def _address(binding: Binding, name: str) -> tuple[str, int | str]:
             return "", str(options["port"])
         case _:
             message = f"`driver: {driver}` leads to nothing that can be served on this host"
-            hint = "let the binding be made: name the protocols, such as --modbus --opcua"
+            hint = (
+                "the cell that is served has all machines of the net: give these a protocol, too, or let the binding "
+                "be made, by protocols such as --modbus --opcua"
+            )
             raise InputError([binding.problem("F5104", ("devices", name, "driver"), message, hint)])
     return HERE if str(host).lower() == "localhost" else str(host), int(port)
 
