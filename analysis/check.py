@@ -91,6 +91,9 @@ _DEADLOCK_LANES: Final = ((Method.REDUCTION, Method.WALK, Method.STATE_EQUATION)
 _FIRST_LANES: Final = ((Method.REDUCTION, Method.WALK), (Method.STATE_EQUATION, Method.PARIKH), *FORMULA_LANES)
 _QUERIES_LANES: Final = ((Method.REDUCTION,), *FORMULA_LANES)
 _FIRST_SLICES_SECONDS: Final = (3.0, 10.0)
+_HARD_SECONDS: Final = (10.0,)
+"""How long each may take at most beside the search for all markings, also where no time is given."""
+_BESIDE_SHARE: Final = 0.25  # of the memory, for these beside the search for all markings
 _QUERIES_SHARE: Final = 0.8  # of the time that is left, for hard ones where nothing else is asked
 _STATED_SHARE: Final = 0.5  # of the time, for what is stated and easy
 _FORMULAS_SHARES: Final = {Logic.LTL: 0.5, Logic.CTL: 0.25}
@@ -243,10 +246,10 @@ class _Check:
             settling.learn(of, _LEARNT_FIRST, _moment(deadline, part))
         # What else is hard of the net waits for the processors, which the search for all markings has; queries go on.
         if self.of_the_net:
-            settling.ask_in_turns(map(_asked_of, self._formulas(*Logic)), (), FORMULA_LANES, deadline, None)
+            settling.ask_in_turns(map(_asked_of, self._formulas(*Logic)), (), FORMULA_LANES, deadline, _HARD_SECONDS)
         else:
             until = replace(self.deadline.share(_QUERIES_SHARE), cancelled=enough)
-            settling.ask_in_turns(asked, (), _QUERIES_LANES, until, None)
+            settling.ask_in_turns(asked, (), _QUERIES_LANES, until, _HARD_SECONDS)
         if self.of_the_net:
             settling.ask(_asked_of(DEADLOCK_FREE), (), _DEADLOCK_LANES, deadline, _FIRST_SLICES_SECONDS)
         is_all = not self.of_the_net and len(self._temporal) == len(self.net.properties)
@@ -348,6 +351,9 @@ class _Check:
         enough, space = Event(), None
         deadline = replace(self.deadline.share(_SPACES_SHARE), cancelled=enough)
         limits = Limits(deadline, self.budget.memory_bytes)
+        if not self.of_the_net:  # the settling goes on as long as the search, and so has its part of the memory
+            settling.memory_bytes = int(_BESIDE_SHARE * self.budget.memory_bytes)
+            limits = replace(limits, memory_bytes=self.budget.memory_bytes - settling.memory_bytes)
         with ThreadPoolExecutor(1) as beside:
             begun = beside.submit(self._begin, settling, deadline, enough)
             contestants = [Contestant("explicit engine", partial(self._held_explicitly, ends))]
@@ -369,6 +375,7 @@ class _Check:
             finally:
                 enough.set()
         begun.result()
+        settling.memory_bytes = self.budget.memory_bytes
         return space
 
     def _held_explicitly(self, ends: dict[str, ReachabilityGraph], limits: Limits) -> StateSpace[Any]:

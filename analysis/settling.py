@@ -97,7 +97,7 @@ class Settling:
     _walked: set[Formula] = field(default_factory=set)
     """The goals that a short walk does not meet."""
     _tried: dict[str, float] = field(default_factory=dict)
-    """The longest turn, in seconds, that a verdict had in vain."""
+    """The longest turn, in seconds, that a formula had in vain; goals are asked of others each time."""
     _judges: dict[tuple[Logic, Method], Callable[[Temporal, Limits], Known]] = field(default_factory=dict)
 
     def learn(self, of: Method, among: Collection[str], deadline: Deadline) -> None:
@@ -209,8 +209,9 @@ class Settling:
     ) -> None:
         """Settle verdicts, the easy ones first: all are asked in turns that grow, of which the last share out the time.
 
-        Which one is hard cannot be seen beforehand, and one that is would take its time from all others. Where all have
-        had turns before, in vain, the first one is longer than the shortest of these. With `once` each has one turn.
+        Which one is hard cannot be seen beforehand, and one that is would take its time from all others. Formulas
+        that all had turns before, in vain, begin with one that is longer than the shortest of these. With `once` each has
+        one turn.
         """
         waiting, left = list(verdicts), deadline.left_seconds
         seconds = _TURN_SECONDS if left is None else min(_TURN_SECONDS, _FIRST_TURN * left / max(1, len(waiting)))
@@ -223,7 +224,7 @@ class Settling:
                 until = deadline.share(1 / later) if is_last else deadline.within(seconds)
                 turn = until.left_seconds
                 self.ask(verdict, fired, lanes, until, slices_seconds)
-                if turn is not None and verdict.name not in self.found:
+                if turn is not None and verdict.name not in self.found and self._goals_of(verdict, fired) is None:
                     self._tried[verdict.name] = max(turn, self._tried.get(verdict.name, 0.0))
                 self.conclude()
             waiting = [] if is_last or once else [verdict for verdict in waiting if verdict.name not in self.found]

@@ -23,11 +23,10 @@ from firable.analysis.race import Contestant, race
 from firable.analysis.reduction.components import parts
 from firable.analysis.reduction.reduce import ReducedTransitions, reduce_for_liveness
 from firable.analysis.reduction.reducer import Reducer
-from firable.analysis.spaces.reachability import Budget, explore
+from firable.analysis.spaces.reachability import explore_few
 from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.analysis.stubborn import FiringSearch, decide_by_stubborn_sets
 from firable.analysis.walk import decide_by_walk
-from firable.nets.diagnostics import InputError
 from firable.nets.formula import Constant, Formula
 from firable.nets.net import Net
 from firable.nets.verdict import Cost
@@ -100,30 +99,26 @@ def decide_reduced(
 
 
 class ByReduction:
-    """Goals on one net, each decided on the net reduced for it; what is proved of the net is kept for the next."""
+    """Decides goals on the reduced net by stubborn sets, a decision diagram, exploring and walks, whichever is first.
+
+    Stubborn sets leave out orders of firing that the rules cannot; a diagram holds what is left of nets whose own is
+    too large; where all transitions hang together neither helps, and a million markings are explored in a second; and
+    walks come to a goal sooner than in the net itself, as a firing stands for many. What is proved of the net is kept
+    for the next goal.
+
+    >>> from firable.nets.catalogue import catalogue_net
+    >>> from firable.nets.formula import Deadlock
+    >>> ByReduction(catalogue_net("one_robot_mc_late"))(Deadlock(), Limits()).cost.markings
+    4
+    """
 
     def __init__(self, net: Net, reducer: Reducer | None = None) -> None:
         self.net = net
         self._reducer = reducer or Reducer(net)
 
     def __call__(self, goal: Formula, limits: Limits) -> Finding:
-        """As `decide_by_reduction`."""
+        """Whether a marking that satisfies the goal is reachable."""
         return decide_reduced(self.net, goal, limits, _by_all, self._reducer)
-
-
-def decide_by_reduction(net: Net, goal: Formula, limits: Limits) -> Finding:
-    """Decide on the reduced net, by stubborn sets, a decision diagram, exploring and random walks, whichever is first.
-
-    Stubborn sets leave out orders of firing that the rules cannot; a diagram holds what is left of nets whose own is
-    too large; where all transitions hang together neither helps, and a million markings are explored in a second; and
-    walks come to a goal sooner than in the net itself, as a firing stands for many.
-
-    >>> from firable.nets.catalogue import catalogue_net
-    >>> from firable.nets.formula import Deadlock
-    >>> decide_by_reduction(catalogue_net("one_robot_mc_late"), Deadlock(), Limits()).cost.markings
-    4
-    """
-    return ByReduction(net)(goal, limits)
 
 
 def _by_all(net: Net, goal: Formula, limits: Limits) -> Finding:
@@ -142,8 +137,7 @@ def _by_all(net: Net, goal: Formula, limits: Limits) -> Finding:
         {"exploring": decide_by_exploring, "walk": partial(decide_by_walk, firings=_WALKED_BESIDE)},
     ]
     lanes = [[Contestant(name, partial(_decided, of, net, goal)) for name, of in lane.items()] for lane in deciders]
-    of_two = replace(limits, memory_bytes=3 * limits.memory_bytes // 2)  # walks keep nothing, and are given a third
-    outcome = race(lanes, of_two, slices_seconds=None)
+    outcome = race(lanes, limits, slices_seconds=None)
     why = "the time was over" if limits.deadline.over else "; ".join(outcome.told)
     return outcome.answer or replace(first, bound=why)
 
@@ -178,13 +172,10 @@ def decide_by_exploring(net: Net, goal: Formula, limits: Limits) -> Finding:
 
     What was found until the limits are met may hold one, too.
     """
-    began, budget = perf_counter(), Budget(_EXPLORED_MAX, limits.memory_bytes)
+    began = perf_counter()
     try:
-        graph = explore(net, budget=budget, deadline=limits.deadline.share(_EXPLORING_SHARE))
-        graph = graph.until(limits.deadline)
+        graph = explore_few(net, limits, _EXPLORED_MAX, _EXPLORING_SHARE)
         witness = graph.witness(graph.satisfying(goal))
-    except InputError as error:  # this part of the memory does not hold the net itself
-        return Finding(None, EXPLORED, bound=error.diagnostics[0].message)
     except BudgetExceeded as error:
         return Finding(None, EXPLORED, bound=str(error), cost=Cost(seconds=perf_counter() - began))
     reachable = True if witness is not None else False if graph.complete else None

@@ -20,7 +20,7 @@ from firable.analysis.goal import Limits
 from firable.analysis.reduction.agglomeration import agglomerate
 from firable.analysis.reduction.constants import remove_constants
 from firable.analysis.reduction.copies import merge_places, remove_subsumed
-from firable.analysis.reduction.draft import Draft, Move, Origin, Tail, flat, literal
+from firable.analysis.reduction.draft import Draft, Move, Origin, Tail, flat
 from firable.analysis.reduction.early import fire_early
 from firable.analysis.reduction.goals import Goal, Labels, goal_of, rewritten, written_out
 from firable.analysis.reduction.implied import remove_dead, remove_implied_gates, remove_implied_places
@@ -319,7 +319,6 @@ def _reduce(draft: Draft, limits: Limits, facts: Pairs | None = None) -> None:
     fresh = False
     if facts is not None:
         _by_arcs(draft, fired, deadline)
-        facts = facts if all(literal(place, value=True) in facts.numbers for place in draft.places) else None
         draft.touch_all()
     while not deadline.over:
         changed = facts is not None and _by_facts(draft, facts, deadline)

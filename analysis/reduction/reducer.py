@@ -7,9 +7,11 @@ once. A reduction that came to its end is kept, since who is asked in turns is a
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final, Generic, TypeVar
 
+from firable.analysis._engine import BudgetExceeded
 from firable.analysis.goal import Limits
 from firable.nets.formula import Formula
 from firable.nets.net import Marking, Net, holding
@@ -24,17 +26,23 @@ _KEPT_SIZE_MAX: Final = 400_000
 """Reductions that are kept of a kind, and places and transitions of the net for all of them: some 0.4 kB for each."""
 _REDUCING_SECONDS: Final = 8e-5
 """What it takes for each place and each transition, of large nets."""
-_PROVING_SECONDS: Final = 4e-5
-"""The same of what is proved of the net for all that is asked."""
+_PROVING_SECONDS: Final = 2e-5
+"""The same of what is proved of the net for all that is asked, and for each pair of literals:"""
+_PAIR_SECONDS: Final = 8e-9
+_PROVING_SHARE: Final = 0.4
+"""The part of the time left that this proof may take; what comes after goes on without."""
+_AGAIN: Final = 2.0
+"""One that time has ended is tried again with so many times as long."""
 
 
 class Reducer:
     """Reduces a net as `firable.analysis.reduction.reduce` does, by facts that are proved of it once."""
 
-    def __init__(self, net: Net, facts: Pairs | None = None) -> None:
+    def __init__(self, net: Net) -> None:
         self.net = net
-        self._facts = facts
-        self._are_facts_tried = facts is not None
+        self._facts: Pairs | None = None
+        self._is_beyond_proof = False
+        self._in_vain_seconds = 0.0
         self._is_first_goal = True
         most = max(1, min(_KEPT_MAX, _KEPT_SIZE_MAX // (len(net.places) + len(net.transitions) + 1)))
         self._goals: _Kept[Reduced] = _Kept(most)
@@ -43,13 +51,19 @@ class Reducer:
 
     def at(self, marking: Marking) -> Reducer:
         """The reducer of the net that begins in a reachable marking, of which all that is proved is true as well."""
-        return Reducer(replace(self.net, places=holding(self.net.places, marking)), self._facts)
+        there = Reducer(replace(self.net, places=holding(self.net.places, marking)))
+        there._facts, there._is_beyond_proof = self._facts, self._is_beyond_proof
+        there._in_vain_seconds = self._in_vain_seconds
+        return there
 
     @property
     def takes_seconds(self) -> float:
         """About how long the next reduction takes."""
-        each = 0.0 if self._are_facts_tried else _PROVING_SECONDS
-        return (each + _REDUCING_SECONDS) * (len(self.net.places) + len(self.net.transitions))
+        places, size = len(self.net.places), len(self.net.places) + len(self.net.transitions)
+        is_proved = self._facts is not None or self._is_beyond_proof
+        return _REDUCING_SECONDS * size + (
+            0.0 if is_proved else _PROVING_SECONDS * size + _PAIR_SECONDS * 4 * places**2
+        )
 
     def for_goal(self, goal: Formula, limits: Limits) -> Reduced:
         """The net reduced for a goal, as far as that comes until the deadline; a checker cannot take its steps.
@@ -85,9 +99,16 @@ class Reducer:
     def _proved(self, limits: Limits) -> Pairs | None:
         from firable.analysis.reduction.reduce import facts_on
 
-        if not self._are_facts_tried:
-            self._facts = facts_on(self.net, limits)
-            self._are_facts_tried = self._facts is not None or not limits.deadline.over
+        within = replace(limits, deadline=limits.deadline.share(_PROVING_SHARE))
+        left = within.deadline.left_seconds
+        is_short = left is not None and left < _AGAIN * self._in_vain_seconds
+        if self._facts is None and not self._is_beyond_proof and not is_short:
+            with suppress(BudgetExceeded):
+                self._facts = facts_on(self.net, within)
+            if left is None or not within.deadline.over:
+                self._is_beyond_proof = self._facts is None
+            elif self._facts is None:
+                self._in_vain_seconds = left
         return self._facts
 
 
@@ -100,8 +121,9 @@ class _Kept(Generic[R]):
 
     def of(self, labels: tuple[Formula, ...], reduced: Callable[[], R], limits: Limits) -> R:
         """What is kept, or else is made now, and is kept unless the deadline has ended it."""
-        found = self._found.pop(labels) if labels in self._found else reduced()
-        if not limits.deadline.over:
+        is_kept = labels in self._found
+        found = self._found.pop(labels) if is_kept else reduced()
+        if is_kept or not limits.deadline.over:
             self._found[labels] = found
             if len(self._found) > self._most:
                 del self._found[next(iter(self._found))]

@@ -24,6 +24,7 @@ from firable.analysis import _engine
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
 from firable.analysis.compiled import engine_limits, flat
 from firable.analysis.deadline import NEVER, Deadline
+from firable.analysis.goal import Limits
 from firable.analysis.spaces.space import Derived, Witnesses
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.formula import Formula, Or
@@ -453,6 +454,18 @@ def explore(
             [Diagnostic("F3004", message, "give it a larger budget of memory, or the method `symbolic`")]
         ) from None
     return ReachabilityGraph(net, discipline, budget, graph, deadline)
+
+
+def explore_few(net: Net, limits: Limits, markings: int, share: float) -> ReachabilityGraph:
+    """At most so many markings, in such a part of the time that a technique has; questions end with all of its time.
+
+    Raises `BudgetExceeded` where the memory that it has does not hold the net itself.
+    """
+    budget = Budget(markings, limits.memory_bytes)
+    try:
+        return explore(net, budget=budget, deadline=limits.deadline.share(share)).until(limits.deadline)
+    except InputError as error:
+        raise BudgetExceeded(error.diagnostics[0].message) from None
 
 
 def _explored(

@@ -15,18 +15,17 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, Final
 
-from firable.analysis._engine import BudgetExceeded, IncompleteGraph
+from firable.analysis._engine import BudgetExceeded
 from firable.analysis.goal import Limits
 from firable.analysis.race import Contestant, race
 from firable.analysis.reduction.reduce import ReducedBranches
 from firable.analysis.reduction.reducer import Reducer
-from firable.analysis.spaces.reachability import Budget, explore
+from firable.analysis.spaces.reachability import explore_few
 from firable.analysis.spaces.space import StateSpace
 from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.analysis.temporal.ctl import Ctl, satisfied
 from firable.analysis.temporal.local import decide_ctl_on_the_fly
 from firable.analysis.temporal.sets import Sets
-from firable.nets.diagnostics import InputError
 from firable.nets.formula import Deadlock, Start, leaves_in
 from firable.nets.net import Net
 from firable.nets.temporal import Temporal
@@ -88,13 +87,7 @@ def _locally(net: Net, formula: Temporal, limits: Limits) -> bool | None:
 
 
 def _by_exploring(net: Net, formula: Temporal, limits: Limits) -> bool:
-    budget = Budget(_EXPLORED_MAX, limits.memory_bytes)
-    try:
-        graph = explore(net, budget=budget, deadline=limits.deadline.share(_EXPLORING_SHARE))
-    except InputError as error:  # this part of the memory does not hold the net itself
-        raise IncompleteGraph(error.diagnostics[0].message) from None
-    graph.require_complete()
-    return _over(graph.until(limits.deadline), formula)
+    return _over(explore_few(net, limits, _EXPLORED_MAX, _EXPLORING_SHARE), formula)
 
 
 def _by_diagram(net: Net, formula: Temporal, limits: Limits) -> bool:

@@ -21,9 +21,9 @@ from firable.analysis.goal import Finding, Limits
 from firable.analysis.reduction import deciding
 from firable.analysis.reduction.components import parts
 from firable.analysis.reduction.deciding import (
+    ByReduction,
     KnownByReduction,
     decide_by_diagram,
-    decide_by_reduction,
     decide_reduced,
 )
 from firable.analysis.reduction.reduce import ReducedTransitions, reduce_for_liveness
@@ -169,7 +169,7 @@ def test_one_part_that_does_not_reach_its_goal_decides_and_one_that_is_undecided
 @examples(15)
 @given(cell_nets())
 def test_stubborn_sets_on_the_reduced_net_find_a_deadlock_exactly_if_there_is_one(net: Net) -> None:
-    found = decide_by_reduction(net, Deadlock(), Limits())
+    found = ByReduction(net)(Deadlock(), Limits())
     assert found.reachable is by_playing(net, Deadlock(), Limits()).reachable
     assert (found.witness is not None) is found.reachable
 
@@ -177,11 +177,11 @@ def test_stubborn_sets_on_the_reduced_net_find_a_deadlock_exactly_if_there_is_on
 def test_walks_go_on_beside_what_has_no_room_and_all_that_gave_up_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     net, small = philosophers(60), Limits(memory_bytes=1 << 18)
     monkeypatch.setattr(deciding, "_WALKED_FIRST", 0)
-    found = decide_by_reduction(net, Deadlock(), small)
+    found = ByReduction(net)(Deadlock(), small)
     assert found.reachable
     assert found.method.startswith("random walk, after reduction")
     monkeypatch.setattr(deciding, "_WALKED_BESIDE", 3)
-    left = decide_by_reduction(net, Deadlock(), small)
+    left = ByReduction(net)(Deadlock(), small)
     assert left.reachable is None
     for name in ("stubborn sets", "diagram", "walk"):
         assert f"{name} gave up: " in left.bound
@@ -251,7 +251,7 @@ def test_a_diagram_without_room_decides_nothing() -> None:
 
 def test_a_net_that_was_not_read_in_time_is_left_undecided() -> None:
     late, wide = Limits(Deadline.after(0)), machines(600)
-    found = decide_by_reduction(wide, Deadlock(), late)
+    found = ByReduction(wide)(Deadlock(), late)
     assert found.reachable is None
     assert found.bound == "the time was over before the net was read for its reduction"
     assert KnownByReduction(wide)(late) == {}
