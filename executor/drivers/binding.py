@@ -37,6 +37,9 @@ SIZE_BYTES_MAX: Final = 1024 * 1024
 FILE_BYTES_MAX: Final = 1_000_000
 """More than any certificate or key needs."""
 
+NUMBER_MAX: Final = 65_535
+"""Numbers of commands and of heartbeats fit a register of 16 bits; 0 is no command."""
+
 ACKNOWLEDGED: Final = "acknowledged"
 """How the binding writes of a completion that no sensor has a part in it."""
 
@@ -405,6 +408,8 @@ class _Reading:
             for path, point, use in _device_points(device):
                 self.point(name, ("devices", name, *path), point, use)
             self.values(name, ("devices", name, "safe"), device.safe)
+            for path, point, value, what in _device_writes(device):
+                self.takes(name, ("devices", name, *path), point, value, what)
             for channel, body in device.channels.items():
                 ways = [one for one in (body.number, body.command, body.request) if one is not None]
                 if len(ways) != 1:
@@ -496,6 +501,15 @@ class _Reading:
                 hint = "look up what the device understands, and write a value that it has"
                 self.problem("F5102", (*path, point), message, hint)
 
+    def takes(self, device: str, path: TreePath, point: Point, value: Value, what: str) -> None:
+        """Judge what the driver itself writes to a point: a bit, say, takes no number, and would be 1 for ever."""
+        kind = self.kinds[device]
+        if not isinstance(kind, Bounded) or kind.point_problem(point, Use.WRITE):
+            return
+        if problem := kind.value_problem(point, value):
+            hint = "look up where the device has what takes it, and give it that address"
+            self.problem("F5102", path, f"'{point}' does not take {what}: {problem}", hint)
+
 
 _CHANNEL_POINTS: Final[Mapping[str, Use]] = {
     **dict.fromkeys(("number", "command", "request"), Use.WRITE),
@@ -516,6 +530,18 @@ def _device_points(device: DeviceDocument) -> Iterator[tuple[TreePath, Point, Us
         for key, use in _CHANNEL_POINTS.items():
             if (point := getattr(channel, key)) is not None:
                 yield ("channels", name, key), point, use
+
+
+def _device_writes(device: DeviceDocument) -> Iterator[tuple[TreePath, Point, Value, str]]:
+    """What is written to a device beside what stands in the binding, each by one that asks most of its point."""
+    if device.heartbeat is not None:
+        yield ("heartbeat", "write"), device.heartbeat.write, NUMBER_MAX, f"a heartbeat, which grows to {NUMBER_MAX}"
+    for name, channel in device.channels.items():
+        if channel.number is not None:
+            what = f"the numbers of commands, up to {NUMBER_MAX}"
+            yield ("channels", name, "number"), channel.number, NUMBER_MAX, what
+        elif channel.command is not None:
+            yield ("channels", name, "command"), channel.command, "7 R MOVE", "commands as texts, such as '7 R MOVE'"
 
 
 def writes(mapping: Mapping[Point, str]) -> Writes:

@@ -28,15 +28,11 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from enum import Enum, auto
-from typing import Final
 
-from firable.executor.drivers.binding import ChannelDocument
+from firable.executor.drivers.binding import NUMBER_MAX, ChannelDocument
 from firable.executor.drivers.device import Value, Writes, as_number
 from firable.executor.drivers.driver import Answer
 from firable.executor.protocol.record import record
-
-NUMBER_MAX: Final = 65_535
-"""Numbers fit a register of 16 bits; 0 is no command."""
 
 
 @record

@@ -48,7 +48,7 @@ from contextlib import suppress
 from math import inf
 from typing import Any, Final, Protocol
 
-from firable.executor.drivers.binding import DeviceDocument, writes
+from firable.executor.drivers.binding import NUMBER_MAX, DeviceDocument, writes
 from firable.executor.drivers.cancelling import ended
 from firable.executor.drivers.device import (
     Connection,
@@ -66,7 +66,7 @@ from firable.executor.drivers.device import (
     Writes,
 )
 
-BEATS: Final = 65_536
+BEATS: Final = NUMBER_MAX + 1
 """Heartbeats are numbers from 0, one more each time, and again from 0."""
 
 _CONFIRMED_SECONDS: Final = 0.02

@@ -383,6 +383,8 @@ def _typed(value: Value, kind: Any) -> Value:
     """The value in the type that a node has."""
     match kind.name:
         case "Boolean":
+            if value not in {0, 1}:  # a heartbeat would be 1 for ever
+                raise ValueError("a truth value is 0 or 1")
             return bool(value)
         case "String":
             return str(value)

@@ -178,6 +178,31 @@ def test_a_value_that_its_point_cannot_take_is_refused(old: str, new: str, place
     assert refusal(edited(old, new)) == [("F5102", place)]
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "place", "why"),
+    [
+        ("write: holding 0", "write: coil 3", "7: write", "'coil 3' does not take a heartbeat, which grows to 65535"),
+        ("write: holding 0", "write: holding 0.1", "7: write", "'holding 0.1' does not take a heartbeat"),
+        ("number: holding 5", "number: coil 5", "12: number", "'coil 5' does not take the numbers of commands"),
+        (
+            "number: holding 5",
+            "number: holding 5.2",
+            "12: number",
+            "'holding 5.2' does not take the numbers of commands",
+        ),
+        ("number: holding 5", "command: holding 5", "12: command", "'holding 5' does not take commands as texts"),
+        ("number: holding 5", "command: coil 5", "12: command", "'coil 5' does not take commands as texts"),
+    ],
+)
+def test_a_point_that_does_not_take_what_the_driver_writes_there_is_refused(
+    old: str, new: str, place: str, why: str
+) -> None:
+    """A heartbeat at a bit would be 1 for ever, whether or not anybody sends it."""
+    assert refusal(edited(old, new)) == [("F5102", place)]
+    with pytest.raises(InputError, match=why):
+        parse_binding(edited(old, new))
+
+
 @pytest.mark.parametrize("value", ["65535", "-32768", "0", "true"])
 def test_values_of_16_bits_are_taken_with_a_sign_and_without(value: str) -> None:
     parse_binding(edited("write: {holding 2: 7}", f"write: {{holding 2: {value}}}"))

@@ -29,7 +29,8 @@ def test_commands_of_different_words_that_a_machine_cannot_tell_apart_are_refuse
     assert refusal(edited("{holding 2: 8}", "{holding 2: 7}"), fit=True) == [("F5102", "18: write")]
     bare = GOOD.replace(", write: {holding 2: 7}", "").replace(", write: {holding 2: 8}", "")
     assert refusal(bare, fit=True) == [("F5102", "18: M.stop")]
-    bound_driver(parse_binding(bare.replace("M: {number: holding 1", "M: {command: holding 1")), NET)
+    texts = bare.replace("modbus-tcp", "mqtt").replace("M: {number: holding 1", "M: {command: holding 1")
+    bound_driver(parse_binding(texts), NET)
     alike = GOOD.replace("{holding 2: 7}", "{coil 2: true}").replace("{holding 2: 8}", "{coil 2: 1}")
     assert refusal(alike, fit=True) == [("F5102", "18: write")]
     spelled = GOOD.replace("{holding 2: 8}", "{holding 02: 7}")  # the same register, which must not look like another

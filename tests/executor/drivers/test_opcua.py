@@ -61,6 +61,20 @@ class TestOpcUa(DriverConformance):
 
         self.run(main())
 
+    def test_a_truth_value_takes_no_heartbeat_nor_the_number_of_a_command(self) -> None:
+        async def main() -> None:
+            await self.end.start(lambda _point, _value: None)
+            options = OpcUaOptions(url=f"opc.tcp://127.0.0.1:{self.end.port}/")
+            connection = await KIND.connect(options, Wanted((POINTS["sensor"],), PATIENCE_S))
+            for value in (0, 1, True, False):
+                await connection.write(((POINTS["output"], value),))
+            with pytest.raises(LinkError, match=r"M\.output' does not take 2: a truth value is 0 or 1"):
+                await connection.write(((POINTS["output"], 2),))
+            await connection.close()
+            await self.end.stop()
+
+        self.run(main())
+
     @pytest.mark.parametrize("is_dropped", [True, False])
     def test_a_subscription_that_the_server_has_dropped_or_tells_nothing_of_ends_the_connection(
         self, is_dropped: bool, monkeypatch: pytest.MonkeyPatch

@@ -12,9 +12,9 @@ from firable.cli.main import EXTRAS
 from firable.executor.cell.plant import Plant
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.bench import Heard
-from firable.executor.drivers.binding import ChannelDocument, SignalDocument, parse_binding, read_binding
+from firable.executor.drivers.binding import NUMBER_MAX, ChannelDocument, SignalDocument, parse_binding, read_binding
 from firable.executor.drivers.bound import BoundDriver, bound_driver
-from firable.executor.drivers.channels import NUMBER_MAX, Channel, Order, Outcome, Said
+from firable.executor.drivers.channels import Channel, Order, Outcome, Said
 from firable.executor.drivers.completions import Completions
 from firable.executor.drivers.device import Value, Writes
 from firable.executor.drivers.driver import Answer, Quality
