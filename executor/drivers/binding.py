@@ -447,7 +447,7 @@ class _Reading:
                 message = f"'{other}' stands at the address of '{one}', and has another `{key}`"
                 hint = f"write the same `{key}` for both, so that their points mean the same"
                 self.problem("F5102", ("devices", other), message, hint)
-        for path, message, hint in overlaps(self.document, self.is_one):
+        for path, message, hint in overlaps(self.document, self.is_one, self.whole):
             self.problem("F5102", path, message, hint)
 
     def contact(self, name: str, contact: EmergencyDocument) -> None:
@@ -471,12 +471,13 @@ class _Reading:
 
     def is_written_with(self, bound: SignalDocument, contact: EmergencyDocument) -> bool:
         """Whether what is written to a signal changes what a contact of the same device shows."""
-        if bound.read == contact.read:
-            return True
-        kind = self.kinds[bound.device]
-        return isinstance(kind, Divided) and (
-            kind.whole(bound.read) == contact.read or bound.read == kind.whole(contact.read)
-        )
+        written, shown = bound.read, contact.read
+        return shown in (written, self.whole(bound.device, written)) or written == self.whole(bound.device, shown)
+
+    def whole(self, device: str, point: Point) -> Point:
+        """The point of a device that is written with another one, which is a part of it; itself where it is none."""
+        kind = self.kinds[device]
+        return kind.whole(point) if isinstance(kind, Divided) else point
 
     def device(self, path: TreePath, name: str) -> bool:
         if name in self.document.devices:

@@ -8,7 +8,9 @@ with the heartbeat there, each beat is a command. Refused is
 - what gives a command, at one point with the heartbeat, with what gives those of another channel, or with a value that
   a command writes before it; and such a value at the point of the heartbeat;
 - an answer (*taken*, *done*, *failed*) at one point with another answer, or with what is written. Only the bits by
-  which machines without numbers say that they have failed may be one, a common alarm.
+  which machines without numbers say that they have failed may be one, a common alarm;
+- what a device must show by itself (its sign of life, that its watchdog has tripped, contacts of the emergency stop) at
+  one point with anything that is written, safe outputs as well: the echo of a heartbeat would be life for ever.
 
 A signal may be read anywhere, and safe outputs may be any: to take a request back is one. Two devices at one address
 may have one heartbeat (`sharing.py` says when not). Points are compared as they are written. Rejected: a warning, which
@@ -34,17 +36,27 @@ _HEARTBEAT: Final = "the heartbeat"
 _HINT: Final = "look up where the device has the second of them, and give it that address"
 
 
-def overlaps(document: BindingDocument, is_one: Callable[[str, str], bool]) -> Iterator[Overlap]:
+def overlaps(
+    document: BindingDocument, is_one: Callable[[str, str], bool], whole: Callable[[str, Point], Point]
+) -> Iterator[Overlap]:
     """The points of each device that have two meanings of which one would be taken for the other.
 
-    `is_one` tells of two devices whether they stand at one address.
+    `is_one` tells of two devices whether they stand at one address; `whole` gives the point of a device that is written
+    with one, which is a part of it.
     """
     found: dict[str, _Points] = {}
-    for device in document.devices:
+    for device, body in document.devices.items():
         found[device] = next((points for name, points in found.items() if is_one(name, device)), _Points())
+        found[device].besides.update(dict.fromkeys(body.safe, (device, "a safe output")))
+    for place, command in document.commands.items():
+        what = f"what the command of '{place}' writes"
+        if command.device in found:
+            found[command.device].besides.update(dict.fromkeys(command.write, (command.device, what)))
     for judge in (_gives, _writes, _answers):  # each of all devices, before what is judged by it
         for device, points in found.items():
             yield from judge(document, device, points)
+    for device, points in found.items():
+        yield from _echoes(document, device, points, whole)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +65,8 @@ class _Points:
 
     written: dict[Point, tuple[str, str]] = field(default_factory=dict)
     answers: dict[Point, tuple[str, str, bool]] = field(default_factory=dict)
+    besides: dict[Point, tuple[str, str]] = field(default_factory=dict)
+    """Safe outputs and values of commands, of which one point may have several."""
 
 
 def _gives(document: BindingDocument, device: str, points: _Points) -> Iterator[Overlap]:
@@ -92,6 +106,27 @@ def _answers(document: BindingDocument, device: str, points: _Points) -> Iterato
             if other and not (may_be_common and is_common):
                 yield _two(("devices", device, "channels", name, key), device, point, of, other, role)
             points.answers.setdefault(point, (device, role, may_be_common))
+
+
+def _echoes(
+    document: BindingDocument, device: str, points: _Points, whole: Callable[[str, Point], Point]
+) -> Iterator[Overlap]:
+    """What a device must show by itself, as nobody else knows it, where something is written."""
+    body = document.devices[device]
+    roles: list[tuple[Path, Point, str]] = []
+    if body.alive is not None:
+        roles.append((("devices", device, "alive", "read"), body.alive.read, "the sign of life"))
+    if body.heartbeat is not None and body.heartbeat.tripped is not None:
+        tripped = body.heartbeat.tripped
+        roles.append((("devices", device, "heartbeat", "tripped"), tripped, "what tells that its watchdog has tripped"))
+    for name, contact in document.emergency_stop.items():
+        if contact.device == device:
+            roles.append((("emergency_stop", name, "read"), contact.read, f"the contact '{name}'"))
+    for path, point, role in roles:
+        for written, (of, other) in (points.besides | points.written).items():
+            if point in (written, whole(device, written)) or written == whole(device, point):
+                yield _two(path, device, point, of, other, role)
+                break
 
 
 def _two(path: Path, device: str, point: Point, of: str, one: str, other: str) -> Overlap:

@@ -226,6 +226,41 @@ def test_a_point_that_would_mean_two_things_is_refused(old: str, new: str, place
 
 
 @pytest.mark.parametrize(
+    ("old", "new", "place"),
+    [
+        ("read: input 0", "read: holding 0", "8: read"),
+        ("read: input 0", "read: holding 0.0", "8: read"),
+        ("read: input 0", "read: holding 5", "8: read"),
+        ("read: input 0", "read: coil 1", "8: read"),
+        ("read: input 0", "read: holding 2", "8: read"),
+        ("tripped: discrete 9", "tripped: holding 0", "7: tripped"),
+        ("tripped: discrete 9", "tripped: coil 1", "7: tripped"),
+    ],
+)
+def test_what_a_device_must_show_by_itself_is_read_where_nothing_is_written(old: str, new: str, place: str) -> None:
+    """The echo of a heartbeat at the server of a control, or at a broker, would be its sign of life for ever."""
+    assert refusal(edited(old, new)) == [("F5102", place)]
+
+
+@pytest.mark.parametrize("point", ["holding 0", "holding 0.3", "holding 1", "holding 2", "coil 1"])
+@pytest.mark.parametrize("of", ["plc", "same"])
+def test_a_contact_of_the_emergency_stop_is_read_where_nothing_is_written(point: str, of: str) -> None:
+    same = "  same: {driver: modbus-tcp, host: 10.0.0.1}\n"
+    stop = f"{same}emergency_stop: {{door: {{device: {of}, read: {point}}}}}\nsignals:"
+    assert refusal(edited("signals:", stop)) == [("F5102", "14: read")]
+
+
+def test_a_register_is_written_where_a_bit_of_it_is() -> None:
+    text = edited("safe: {coil 1: false}", "safe: {holding 9.1: false}").replace("read: input 0", "read: holding 9")
+    assert refusal(text) == [("F5102", "8: read")]
+
+
+def test_bits_beside_each_other_in_a_register_are_two_points() -> None:
+    text = edited("write: {holding 2: 7}", "write: {holding 3.1: 1}").replace("input 0", "holding 3.2")
+    parse_binding(text)
+
+
+@pytest.mark.parametrize(
     ("channel", "host", "keys"),
     [
         ("{number: holding 1}", "10.0.0.1", ["number"]),
