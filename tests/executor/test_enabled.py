@@ -85,8 +85,10 @@ def chosen_by_looking_at_all(
     return chosen, turns
 
 
+@pytest.mark.parametrize("are_bound", [False, True])
 @pytest.mark.parametrize("by", ArbitrationRule)
-def test_choice_among_rivals_alone_is_the_choice_among_all(by: ArbitrationRule) -> None:
+def test_choice_among_rivals_alone_is_the_choice_among_all(by: ArbitrationRule, are_bound: bool) -> None:
+    """Of rivals that are enabled and may not fire now, as where they would disturb a promise, none is in the way."""
     for seed in range(60):
         draw = random.Random(seed)
         net = owned_net(seed)
@@ -101,12 +103,15 @@ def test_choice_among_rivals_alone_is_the_choice_among_all(by: ArbitrationRule) 
         turns, last = arbiter.turns, -1
         for _ in range(30):
             candidates = frozenset(t for t in range(len(net.transitions)) if draw.random() < 0.6)
+            bound = {t for t in range(len(net.transitions)) if are_bound and draw.random() < 0.4} - candidates
             if candidates:
                 last, turns = chosen_by_looking_at_all(
                     arbiter.arbitration, turns, last, candidates, len(net.transitions)
                 )
-                assert arbiter.choose(net.transitions[t].name for t in candidates) == net.transitions[last].name
-                assert arbiter.turns == turns
+            enabled = sum(1 << t for t in candidates | bound)
+            is_free = candidates.__contains__ if are_bound else None
+            assert arbiter.following(enabled, is_free) == (last if candidates else None)
+            assert arbiter.turns == turns
 
 
 @pytest.mark.parametrize("by", ArbitrationRule)
