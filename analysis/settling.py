@@ -209,9 +209,8 @@ class Settling:
     ) -> None:
         """Settle verdicts, the easy ones first: all are asked in turns that grow, of which the last share out the time.
 
-        Which one is hard cannot be seen beforehand, and one that is would take its time from all others. Formulas
-        that all had turns before, in vain, begin with one that is longer than the shortest of these. With `once` each has
-        one turn.
+        Which one is hard cannot be seen beforehand, and one that is would take its time from all others. Formulas that
+        all had turns in vain begin with one that is longer than the shortest of these. With `once` each has one turn.
         """
         waiting, left = list(verdicts), deadline.left_seconds
         seconds = _TURN_SECONDS if left is None else min(_TURN_SECONDS, _FIRST_TURN * left / max(1, len(waiting)))

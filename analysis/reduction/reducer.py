@@ -60,10 +60,9 @@ class Reducer:
     def takes_seconds(self) -> float:
         """About how long the next reduction takes."""
         places, size = len(self.net.places), len(self.net.places) + len(self.net.transitions)
-        is_proved = self._facts is not None or self._is_beyond_proof
-        return _REDUCING_SECONDS * size + (
-            0.0 if is_proved else _PROVING_SECONDS * size + _PAIR_SECONDS * 4 * places**2
-        )
+        if self._facts is not None or self._is_beyond_proof:
+            return _REDUCING_SECONDS * size
+        return (_REDUCING_SECONDS + _PROVING_SECONDS) * size + _PAIR_SECONDS * (2 * places) ** 2
 
     def for_goal(self, goal: Formula, limits: Limits) -> Reduced:
         """The net reduced for a goal, as far as that comes until the deadline; a checker cannot take its steps.

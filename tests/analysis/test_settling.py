@@ -11,13 +11,14 @@ import pytest
 
 from firable.analysis import check as checking
 from firable.analysis import settling
+from firable.analysis._engine import IncompleteGraph
 from firable.analysis.check import check
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.methods import Anew, Method, Technique
 from firable.analysis.question import Known, unknown, yes
 from firable.analysis.settling import Settling
-from firable.analysis.spaces.reachability import Budget
+from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
 from firable.analysis.temporal.queries import question_of
 from firable.analysis.walk import Walks
 from firable.nets.catalogue import catalogue_net
@@ -244,6 +245,69 @@ def test_who_judges_formulas_is_made_once_of_a_net_and_has_all_the_time(monkeypa
         one.ask(verdict, (), [[Method.ON_THE_FLY]], NEVER, None)
     assert {one.found[verdict.name].method for verdict in verdicts} == {"easily"}
     assert Forgets.made == [NET]
+
+
+WAITED: list[Limits] = []
+
+
+def in_vain(net: Net, formula: Temporal, limits: Limits) -> Known:
+    """Judges no formula, however long it has; one that names `mc.free` it gives up at once."""
+    WAITED.append(limits)
+    WAITED_SECONDS.append(limits.deadline.left_seconds)
+    while "mc.free" not in str(formula) and not limits.deadline.over:
+        sleep(0.001)
+    raise IncompleteGraph("in vain")
+
+
+WAITED_SECONDS: list[float | None] = []
+
+
+def by_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+    WAITED.clear()
+    WAITED_SECONDS.clear()
+    table: dict[Logic, dict[Method, Technique[FormulaDecider]]] = {
+        logic: {Method.ON_THE_FLY: Anew("in vain", f"{__name__}:in_vain")} for logic in Logic
+    }
+    monkeypatch.setattr(settling, "FORMULAS", table)
+
+
+def test_formulas_that_had_turns_in_vain_begin_with_a_longer_one_unless_one_had_none(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    by_nobody(monkeypatch)
+    monkeypatch.setattr(settling, "_TURN_SECONDS", 0.25)
+    one, (first, second) = settling_of("AG EF mc.free", "AG AF mc.free")
+    lanes = [[Method.ON_THE_FLY]]
+    for verdicts, seconds in (([first], 0.25), ([first], 1.0), ([first, second], 0.25), ([first, second], 1.0)):
+        WAITED_SECONDS.clear()
+        one.ask_in_turns(verdicts, (), lanes, Deadline.after(3600), None, once=True)
+        assert pytest.approx([seconds] * len(verdicts), abs=0.1) == WAITED_SECONDS
+
+
+def test_queries_alone_are_asked_on_beside_the_search_and_end_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    by_nobody(monkeypatch)
+    memory = 1 << 28
+
+    def held(self: object, ends: object, limits: Limits) -> ReachabilityGraph:
+        spaces.append(limits)
+        while len(WAITED) < 2:
+            sleep(0.001)
+        return explore(NET)
+
+    spaces: list[Limits] = []
+    monkeypatch.setattr(checking, "FIRST_MARKINGS", 1)
+    monkeypatch.setattr(checking, "SPACES", {})
+    monkeypatch.setattr(checking._Check, "_held_explicitly", held)
+    report = check(NET, budget=Budget(memory_bytes=memory), queries=[parse_query("AG AF start", "q")], of_the_net=False)
+    assert report.verdict("query.q").status is not Status.UNKNOWN
+    short, long, _ = WAITED_SECONDS  # and once more where the space is there
+    assert short is not None
+    assert long is not None
+    assert short <= 0.25
+    assert long > 5, "it is as long as anybody tries without a limit of time"
+    assert [limits.memory_bytes for limits in WAITED] == [memory // 4, memory // 4, memory]
+    assert [limits.memory_bytes for limits in spaces] == [memory - memory // 4]
+    assert WAITED[1].deadline.over, "what is no longer needed is ended"
 
 
 def by_ctrl_c(*_: object, **__: object) -> Known:

@@ -36,6 +36,7 @@ from firable.nets.net import Net, Place, Transition
 from firable.nets.temporal import Temporal, format_temporal, parse_temporal
 from firable.nets.temporal_parts import has_next
 
+TECHNIQUES = ("_locally", "_by_exploring", "_by_diagram")
 NETS = st.one_of(cell_nets(), lively_nets(), ring_nets(signals=True), dense_nets(signals=True))
 
 
@@ -110,6 +111,18 @@ def test_a_choice_of_closers_is_not_made_by_the_opener() -> None:
     assert "p" not in {place.name for place in reduce_for_runs(net, labels).net.places}
 
 
+def test_what_is_told_of_places_that_go_leaves_a_choice_where_it_was() -> None:
+    # As above, with a label that is a constant, which the labels are told before the choice is looked at.
+    ways = (("a",), ("p",)), (("p",), ("x",)), (("p",), ("y",)), (("x",), ("left",)), (("y",), ("right",))
+    net = chain(*ways, (("z",), ("z2",)))
+    formula = parse_temporal("EF (not a and not z and EF left and EF right)")
+    found = CtlInReduced(Reducer(net)).decided(formula, Limits())
+    assert found is not None
+    assert found[0]
+    labels = [Holds(name) for name in ("a", "z", "left", "right")]
+    assert "p" in {place.name for place in same_branches(net, labels).net.places}
+
+
 def test_an_opener_that_is_in_a_choice_is_not_put_off() -> None:
     # From a the token goes to b, or over p to c: at p it cannot go to b any more.
     ways = (("z",), ("a",)), (("a",), ("p",)), (("p",), ("c",))
@@ -157,6 +170,11 @@ def test_formulas_without_x_have_the_value_that_they_have_over_sets(data: st.Dat
     assert decide_ctl_by_parts(net, formula, Limits()).answer.holds is expected
 
 
+def gives_up(net: Net, formula: Temporal, limits: Limits) -> Known:
+    """A technique that decides nothing."""
+    raise IncompleteGraph("not this one")
+
+
 class Counting(Reducer):
     """A reducer that counts for how many formulas it is asked."""
 
@@ -180,6 +198,27 @@ def test_what_was_not_decided_is_asked_again_only_with_twice_the_time() -> None:
     assert found[0]
 
 
+@pytest.mark.parametrize("alone", TECHNIQUES)
+@pytest.mark.parametrize(
+    ("text", "holds"), [("AG EF counter.zero0", True), ("AF counter.one1", True), ("EG counter.zero0", False)]
+)
+def test_each_technique_decides_alone(monkeypatch: pytest.MonkeyPatch, alone: str, text: str, holds: bool) -> None:
+    for name in set(TECHNIQUES) - {alone}:
+        monkeypatch.setattr(f"firable.analysis.temporal.in_reduced.{name}", gives_up)
+    found = CtlInReduced(Reducer(family_net("counter-17"))).decided(parse_temporal(text), Limits())
+    assert found is not None
+    assert found[0] is holds
+
+
+def test_a_formula_is_asked_as_a_whole_before_its_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("firable.analysis.temporal.by_parts.decide_ctl_on_the_fly", gives_up)
+    net, formula = family_net("counter-17"), parse_temporal("AF counter.one1 and AG EF counter.zero0")
+    found = decide_ctl_by_parts(net, formula, Limits())
+    assert found.answer.holds
+    assert found.method.count("after reduction from") == 1
+    assert ";" not in found.method
+
+
 def test_no_reduction_is_begun_for_what_it_cannot_say_or_in_no_time() -> None:
     reducer = Counting(catalogue_net("one_robot"))
     asked = CtlInReduced(reducer)
@@ -193,9 +232,6 @@ def test_no_reduction_is_begun_for_what_it_cannot_say_or_in_no_time() -> None:
 
 
 def test_next_markings_are_asked_in_nets_that_begin_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    def gives_up(net: Net, formula: Temporal, limits: Limits) -> Known:
-        raise IncompleteGraph("not in the net itself")
-
     monkeypatch.setattr("firable.analysis.temporal.by_parts.decide_ctl_on_the_fly", gives_up)
     # The next marking has a 1 in the first digit alone, which turns to 0 before there is one in the second.
     net = family_net("counter-17")

@@ -30,12 +30,15 @@ from firable.analysis.reduction.reduce import ReducedTransitions, reduce_for_liv
 from firable.analysis.spaces.space import WitnessError, Witnesses
 from firable.analysis.stubborn import Firings, FiringSearch
 from firable.nets.catalogue import catalogue_net
+from firable.nets.catalogue.families import family_net
 from firable.nets.catalogue.processes import machines, philosophers
 from firable.nets.formula import And, Deadlock, Formula, Holds, Not, parse_formula
 from firable.nets.net import Net, Place, Transition
 from firable.nets.verdict import Cost, Status, Witness
 from firable.semantics.player import Player
 from firable.semantics.trace import Discipline
+
+TECHNIQUES = ("decide_by_stubborn_sets", "decide_by_diagram", "decide_by_exploring", "decide_by_walk")
 
 
 def by_playing(net: Net, goal: Formula, limits: Limits) -> Finding:
@@ -276,3 +279,17 @@ def test_a_net_that_was_reduced_once_is_searched_on_and_not_reduced_again(monkey
     assert known["quasi-live"].answer.holds
     assert reduced == [net.name]
     assert asked == [(asked[0][0], limits) for limits in looks]
+
+
+@pytest.mark.parametrize("alone", TECHNIQUES)
+def test_each_technique_is_asked_in_the_reduced_net(monkeypatch: pytest.MonkeyPatch, alone: str) -> None:
+    def gives_up(net: Net, goal: Formula, limits: Limits, **_: object) -> Finding:
+        return Finding(None, "gives up", bound="nothing")
+
+    monkeypatch.setattr(deciding, "_ALONE_FIRST", 1)
+    for name in set(TECHNIQUES) - {alone}:
+        monkeypatch.setattr(deciding, name, gives_up)
+    met = parse_formula("counter.one0 and counter.one1 and counter.zero2")
+    found = ByReduction(family_net("counter-17"))(met, Limits())
+    assert found.reachable
+    assert found.witness is not None

@@ -1,6 +1,7 @@
 """What is kept of a net between questions changes no answer, and what time ended is not kept."""
 
 from dataclasses import replace
+from time import sleep
 
 import pytest
 from hypothesis import given
@@ -79,6 +80,8 @@ def test_a_reduction_that_came_to_its_end_is_kept_and_one_that_time_ended_is_not
     assert len(found.net.places) < len(NET.places)
     assert len(proved) == 2  # time had ended the first proof, too
     assert reducer.for_branches(GOALS, Limits()) is found
+    assert reducer.for_branches(GOALS, over) is found
+    assert reducer.for_branches(GOALS, Limits()) is found
     goal, runs = reducer.for_goal(GOALS[0], Limits()), reducer.for_runs(GOALS, Limits())
     assert reducer.for_goal(GOALS[0], Limits()) is goal
     assert reducer.for_runs(GOALS, Limits()) is runs
@@ -90,6 +93,42 @@ def test_a_reduction_that_came_to_its_end_is_kept_and_one_that_time_ended_is_not
     reducer.for_goal(GOALS[2], Limits())
     assert reducer.for_goal(GOALS[0], Limits()) is first
     assert reducer.for_goal(GOALS[1], Limits()) is not second
+
+
+def test_a_proof_that_takes_too_long_costs_a_part_of_a_turn_and_is_tried_again_with_twice_the_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tried: list[float] = []
+
+    def until_over(net: Net, limits: Limits) -> None:
+        tried.append(limits.deadline.left_seconds or 0.0)
+        while not limits.deadline.over:
+            sleep(0.001)
+
+    monkeypatch.setattr(reduce, "facts_on", until_over)
+    reducer = Reducer(NET)
+    for seconds, times in ((1.0, 1), (1.0, 1), (1.8, 1), (3.0, 2)):
+        limits = Limits(Deadline.after(seconds))
+        found = reducer.for_branches([GOALS[0], GOALS[times]], limits)
+        assert len(tried) == times
+        assert not limits.deadline.over
+        assert len(found.net.places) < len(NET.places)
+    there = reducer.at(NET.initial_marking)
+    there.for_branches(GOALS, Limits(Deadline.after(1.8)))
+    assert len(tried) == 2
+
+
+def test_a_net_that_no_facts_are_proved_of_is_not_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried: list[Net] = []
+    monkeypatch.setattr(reduce, "facts_on", lambda net, _: tried.append(net))
+    reducer = Reducer(NET)
+    before = reducer.takes_seconds
+    for _ in range(2):
+        reducer.for_runs(GOALS, Limits(Deadline.after(60)))
+        reducer.for_branches(GOALS, Limits())
+        reducer.at(NET.initial_marking).for_branches(GOALS, Limits())
+    assert len(tried) == 1
+    assert reducer.takes_seconds < before
 
 
 def test_of_a_net_that_begins_elsewhere_the_same_facts_are_true(proved: list[Net]) -> None:

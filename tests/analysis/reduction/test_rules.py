@@ -222,6 +222,15 @@ def test_what_was_known_bounds_what_is_proved_later() -> None:
     assert again.exclude(b, d)
 
 
+def test_a_move_is_dead_that_has_one_need_which_is_never_met() -> None:
+    draft = draft_of("b", "a", "t: a -> b", "u: c -> d")
+    facts = facts_of(draft)
+    assert [facts.dead(move.without(draft.places - {move.literals[0] // 2})) for move in draft.moves.values()] == [
+        False,
+        True,
+    ]
+
+
 def test_facts_that_take_too_long_are_none(monkeypatch: pytest.MonkeyPatch) -> None:
     draft = draft_of("a", "a", *(f"t{i}: a -> b{i}" for i in range(300)))
     assert pairs(draft, None, NEVER) is not None
