@@ -54,7 +54,12 @@ class Deadline:
     @property
     def over(self) -> bool:
         """Whether the moment has come."""
-        return monotonic() >= self.at_seconds or (self.cancelled is not None and self.cancelled.is_set())
+        return monotonic() >= self.at_seconds or self.is_cancelled
+
+    @property
+    def is_cancelled(self) -> bool:
+        """Whether the flag was set: who was ended so had not all of the time."""
+        return self.cancelled is not None and self.cancelled.is_set()
 
     @property
     def left_seconds(self) -> float | None:

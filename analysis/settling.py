@@ -223,7 +223,8 @@ class Settling:
                 until = deadline.share(1 / later) if is_last else deadline.within(seconds)
                 turn = until.left_seconds
                 self.ask(verdict, fired, lanes, until, slices_seconds)
-                if turn is not None and verdict.name not in self.found and self._goals_of(verdict, fired) is None:
+                is_open = verdict.name not in self.found and not until.is_cancelled
+                if turn is not None and is_open and self._goals_of(verdict, fired) is None:
                     self._tried[verdict.name] = max(turn, self._tried.get(verdict.name, 0.0))
                 self.conclude()
             waiting = [] if is_last or once else [verdict for verdict in waiting if verdict.name not in self.found]

@@ -106,7 +106,7 @@ class Reducer:
                 self._facts = facts_on(self.net, within)
             if left is None or not within.deadline.over:
                 self._is_beyond_proof = self._facts is None
-            elif self._facts is None:
+            elif self._facts is None and not within.deadline.is_cancelled:
                 self._in_vain_seconds = left
         return self._facts
 

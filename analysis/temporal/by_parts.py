@@ -48,7 +48,7 @@ from firable.semantics.formulas import evaluate
 from firable.semantics.player import Player, holds_in
 
 _GLANCE: Final = 0.05  # of the time that is left, for a first local evaluation
-_REDUCED: Final = 0.6  # for the formula, and for each part of it, in a reduced net
+_REDUCED: Final = 0.75  # for the formula, and for each part of it, in a reduced net
 _CONSTANTS: Final = 0.5  # for state formulas that hold always or never
 _EACH: Final = 0.1  # for one of these
 _PART: Final = 0.4  # for each part by goals

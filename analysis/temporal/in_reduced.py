@@ -69,7 +69,7 @@ class CtlInReduced:
         if outcome.interrupted:
             raise KeyboardInterrupt
         if outcome.answer is None:
-            if left is not None:
+            if left is not None and not limits.deadline.is_cancelled:
                 self._in_vain[formula] = left
             return None
         return outcome.answer, f"{outcome.winner}, after {reduced.summary}"

@@ -5,6 +5,8 @@ from __future__ import annotations
 import random
 from collections import Counter
 from collections.abc import Sequence
+from threading import Event
+from time import monotonic
 
 import pytest
 from hypothesis import given
@@ -190,9 +192,12 @@ def test_what_was_not_decided_is_asked_again_only_with_twice_the_time() -> None:
     digits = " and ".join(f"EF counter.one{n}" for n in range(17))
     formula, reducer = parse_temporal(f"AG ({digits})"), Counting(family_net("counter-17"))
     asked = CtlInReduced(reducer)
-    for seconds, times in ((20.0, 1), (20.0, 1), (30.0, 1), (90.0, 2)):
+    cancelled = Event()
+    cancelled.set()
+    assert asked.decided(formula, Limits(Deadline(monotonic() + 600, cancelled))) is None
+    for seconds, times in ((20.0, 2), (20.0, 2), (30.0, 2), (90.0, 3)):
         assert asked.decided(formula, Limits(Deadline.after(seconds), memory_bytes=3000)) is None
-        assert reducer.asked == times
+        assert reducer.asked == times, "who was ended from outside is asked again, as it had not all of its time"
     found = asked.decided(formula, Limits())
     assert found is not None
     assert found[0]

@@ -1,7 +1,8 @@
 """What is kept of a net between questions changes no answer, and what time ended is not kept."""
 
 from dataclasses import replace
-from time import sleep
+from threading import Event
+from time import monotonic, sleep
 
 import pytest
 from hypothesis import given
@@ -106,7 +107,11 @@ def test_a_proof_that_takes_too_long_costs_a_part_of_a_turn_and_is_tried_again_w
             sleep(0.001)
 
     monkeypatch.setattr(reduce, "facts_on", until_over)
+    cancelled = Event()
+    cancelled.set()
     reducer = Reducer(NET)
+    reducer.for_branches(GOALS, Limits(Deadline(monotonic() + 600, cancelled)))
+    tried.clear()
     for seconds, times in ((1.0, 1), (1.0, 1), (1.8, 1), (3.0, 2)):
         limits = Limits(Deadline.after(seconds))
         found = reducer.for_branches([GOALS[0], GOALS[times]], limits)
