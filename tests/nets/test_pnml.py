@@ -421,7 +421,7 @@ def test_every_public_net_has_its_places_transitions_and_self_loops() -> None:
     wrong = {}
     for row in rows:
         imported = read_pnml(folder / row["file"])
-        loops = any("put it back" in note.message for note in imported.notes)
+        loops = any(" it back" in note.message for note in imported.notes)
         found = (len(imported.net.places), len(imported.net.transitions), loops)
         if found != (int(row["places"]), int(row["transitions"]), row["self_loops"] == "yes"):
             wrong[row["file"]] = found
