@@ -112,14 +112,14 @@ def test_a_proof_that_takes_too_long_costs_a_part_of_a_turn_and_is_tried_again_w
     reducer = Reducer(NET)
     reducer.for_branches(GOALS, Limits(Deadline(monotonic() + 600, cancelled)))
     tried.clear()
-    for seconds, times in ((1.0, 1), (1.0, 1), (1.8, 1), (3.0, 2)):
+    for seconds, times in ((1.0, 1), (1.0, 1), (1.2, 1), (3.0, 2)):
         limits = Limits(Deadline.after(seconds))
         found = reducer.for_branches([GOALS[0], GOALS[times]], limits)
         assert len(tried) == times
         assert not limits.deadline.over
         assert len(found.net.places) < len(NET.places)
     there = reducer.at(NET.initial_marking)
-    there.for_branches(GOALS, Limits(Deadline.after(1.8)))
+    there.for_branches(GOALS, Limits(Deadline.after(1.2)))
     assert len(tried) == 2
 
 
