@@ -247,11 +247,10 @@ class _Check:
         # What else is hard of the net waits for the processors, which the search for all markings has; queries go on.
         if self.of_the_net:
             settling.ask_in_turns(map(_asked_of, self._formulas(*Logic)), (), FORMULA_LANES, deadline, _HARD_SECONDS)
+            settling.ask(_asked_of(DEADLOCK_FREE), (), _DEADLOCK_LANES, deadline, _FIRST_SLICES_SECONDS)
         else:
             until = replace(self.deadline.share(_QUERIES_SHARE), cancelled=enough)
             settling.ask_in_turns(asked, (), _QUERIES_LANES, until, _HARD_SECONDS)
-        if self.of_the_net:
-            settling.ask(_asked_of(DEADLOCK_FREE), (), _DEADLOCK_LANES, deadline, _FIRST_SLICES_SECONDS)
         is_all = not self.of_the_net and len(self._temporal) == len(self.net.properties)
         if is_all and asked and all(verdict.name in settling.found for verdict in asked):
             enough.set()

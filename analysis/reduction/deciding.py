@@ -37,9 +37,6 @@ _REDUCING_SHARE: Final = 0.75
 _WALKED_FIRST: Final = 2**18
 _WALKED_BESIDE: Final = 2**28
 """Firings of walks, alone and beside the others, which may have given up before."""
-_EXPLORED_MAX: Final = 2**22
-"""Markings that are explored before walks begin, in so much of the time:"""
-_EXPLORING_SHARE: Final = 0.5
 _ALONE_SHARE: Final = 0.15
 """The part of the time left for each technique that is alone before the others begin."""
 _ALONE_FIRST: Final = 2**12
@@ -174,7 +171,7 @@ def decide_by_exploring(net: Net, goal: Formula, limits: Limits) -> Finding:
     """
     began = perf_counter()
     try:
-        graph = explore_few(net, limits, _EXPLORED_MAX, _EXPLORING_SHARE)
+        graph = explore_few(net, limits)
         witness = graph.witness(graph.satisfying(goal))
     except BudgetExceeded as error:
         return Finding(None, EXPLORED, bound=str(error), cost=Cost(seconds=perf_counter() - began))

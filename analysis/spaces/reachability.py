@@ -51,6 +51,9 @@ __all__ = [
 
 _KEPT_SHARE: Final = 8
 """The columns that are kept take at most this part of the memory that the exploration may take."""
+_FEW_MAX: Final = 2**22
+_FEW_SHARE: Final = 0.5
+"""So many markings are few, and are found in this part of the time that a technique has."""
 _LARGE: Final = 8
 """So many parts make a disjunction large."""
 _METHODS: Final = {
@@ -456,14 +459,14 @@ def explore(
     return ReachabilityGraph(net, discipline, budget, graph, deadline)
 
 
-def explore_few(net: Net, limits: Limits, markings: int, share: float) -> ReachabilityGraph:
-    """At most so many markings, in such a part of the time that a technique has; questions end with all of its time.
+def explore_few(net: Net, limits: Limits) -> ReachabilityGraph:
+    """The markings of a net where they are few, in a part of the time that a technique has; questions have all of it.
 
     Raises `BudgetExceeded` where the memory that it has does not hold the net itself.
     """
-    budget = Budget(markings, limits.memory_bytes)
+    budget = Budget(_FEW_MAX, limits.memory_bytes)
     try:
-        return explore(net, budget=budget, deadline=limits.deadline.share(share)).until(limits.deadline)
+        return explore(net, budget=budget, deadline=limits.deadline.share(_FEW_SHARE)).until(limits.deadline)
     except InputError as error:
         raise BudgetExceeded(error.diagnostics[0].message) from None
 

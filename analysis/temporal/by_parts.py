@@ -86,9 +86,9 @@ class CtlByParts:
         parts = _Parts(self._goals, limits)
         holds, witness = parts.decided(formula)
         if holds is None:
-            raise IncompleteGraph("not decided by goals and local evaluation")
+            raise IncompleteGraph("not decided by goals, in reduced nets or marking by marking")
         method = "; ".join(dict.fromkeys(parts.methods)) or "the initial marking"
-        hint = "" if holds or witness else "it was evaluated marking by marking: no run is kept that shows it"
+        hint = "" if holds or witness else "it was decided without all markings: no run is kept that shows it"
         return Known(Answer(holds, witness=witness, hint=hint), method, Cost(seconds=perf_counter() - began))
 
 

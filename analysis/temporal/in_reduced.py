@@ -33,9 +33,6 @@ from firable.nets.temporal_parts import has_next, states_in, with_states
 
 _REDUCING_SHARE: Final = 0.7
 """The part of the time left that the reduction may take."""
-_EXPLORED_MAX: Final = 2**22
-"""Markings that are explored before a diagram is made of all, in so much of the time:"""
-_EXPLORING_SHARE: Final = 0.5
 
 
 class CtlInReduced:
@@ -87,7 +84,7 @@ def _locally(net: Net, formula: Temporal, limits: Limits) -> bool | None:
 
 
 def _by_exploring(net: Net, formula: Temporal, limits: Limits) -> bool:
-    return _over(explore_few(net, limits, _EXPLORED_MAX, _EXPLORING_SHARE), formula)
+    return _over(explore_few(net, limits), formula)
 
 
 def _by_diagram(net: Net, formula: Temporal, limits: Limits) -> bool:

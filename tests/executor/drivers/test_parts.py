@@ -269,13 +269,18 @@ def test_command_that_a_device_has_had_since_before_a_restart_is_not_told_as_tak
     assert one.shows("failed", one.number("a", 3)) == (Outcome(Order("a", 3, one.number("a", 3), ""), Said.FAILED),)
 
 
-def test_device_that_has_forgotten_a_command_is_not_given_it_again() -> None:
+def begun() -> Channel:
+    """A channel of which the device has taken the first command of `a`."""
     one = channel("a", answered="a")
-    number = one.number("a", 1)
     one.send("a", 1, "RUN", ())
     after(one, taken=0, done=0)
     one.written()
-    one.shows("taken", number)
+    one.shows("taken", one.number("a", 1))
+    return one
+
+
+def test_device_that_has_forgotten_a_command_is_not_given_it_again() -> None:
+    one = begun()
     one.shows("taken", 0)  # it has been switched off and on
     forgotten = one.connected_again()
     assert forgotten is not None
@@ -284,12 +289,8 @@ def test_device_that_has_forgotten_a_command_is_not_given_it_again() -> None:
 
 
 def test_device_whose_server_has_no_value_of_what_it_has_taken_has_not_forgotten_it() -> None:
-    one = channel("a", answered="a")
+    one = begun()
     number = one.number("a", 1)
-    one.send("a", 1, "RUN", ())
-    after(one, taken=0, done=0)
-    one.written()
-    one.shows("taken", number)
     one.shows("taken", "BadWaitingForInitialData")
     assert one.connected_again() is None
     assert one.forgotten() is None
