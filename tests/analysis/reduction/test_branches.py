@@ -224,6 +224,12 @@ def test_a_formula_is_asked_as_a_whole_before_its_parts(monkeypatch: pytest.Monk
     assert ";" not in found.method
 
 
+def test_what_needs_two_that_are_never_together_fails_though_it_has_an_x(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("firable.analysis.temporal.by_parts.decide_ctl_on_the_fly", gives_up)
+    formula = parse_temporal("EF (EG counter.zero0 and EG counter.one0 and EX counter.one1)")
+    assert decide_ctl_by_parts(family_net("counter-17"), formula, Limits()).answer.holds is False
+
+
 def test_no_reduction_is_begun_for_what_it_cannot_say_or_in_no_time() -> None:
     reducer = Counting(catalogue_net("one_robot"))
     asked = CtlInReduced(reducer)

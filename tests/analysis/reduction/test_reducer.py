@@ -71,9 +71,7 @@ def test_facts_are_proved_once_for_all_questions_but_the_first_goal(proved: list
     assert proved == [NET]
 
 
-def test_a_reduction_that_came_to_its_end_is_kept_and_one_that_time_ended_is_not(
-    monkeypatch: pytest.MonkeyPatch, proved: list[Net]
-) -> None:
+def test_a_reduction_that_came_to_its_end_is_kept_and_one_that_time_ended_is_not(proved: list[Net]) -> None:
     reducer, over = Reducer(NET), Limits(Deadline.after(0))
     hasty = reducer.for_branches(GOALS, over)
     assert len(hasty.net.places) == len(NET.places)
@@ -86,8 +84,13 @@ def test_a_reduction_that_came_to_its_end_is_kept_and_one_that_time_ended_is_not
     goal, runs = reducer.for_goal(GOALS[0], Limits()), reducer.for_runs(GOALS, Limits())
     assert reducer.for_goal(GOALS[0], Limits()) is goal
     assert reducer.for_runs(GOALS, Limits()) is runs
-    # Of many the last ones are kept.
-    monkeypatch.setattr("firable.analysis.reduction.reducer._KEPT_MAX", 2)
+
+
+@pytest.mark.parametrize(
+    ("bound", "most"), [("_KEPT_MAX", 2), ("_KEPT_SIZE_MAX", 2 * (len(NET.places) + len(NET.transitions) + 1))]
+)
+def test_of_many_reductions_the_last_ones_are_kept(monkeypatch: pytest.MonkeyPatch, bound: str, most: int) -> None:
+    monkeypatch.setattr(f"firable.analysis.reduction.reducer.{bound}", most)
     reducer = Reducer(NET)
     first, second = (reducer.for_goal(one, Limits()) for one in GOALS[:2])
     assert reducer.for_goal(GOALS[0], Limits()) is first
